@@ -1,0 +1,102 @@
+#pragma once
+
+// Offscreen pictures of triangle meshes. Knows no solver: it takes positions, triangles and
+// colours in memory and gives back pixels.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <piecework/core/types.hpp>
+
+namespace piecework::render {
+
+struct Rgb {
+  float r = 0, g = 0, b = 0;  ///< linear order, sRGB-encoded values in [0, 1]
+};
+
+enum class ColorMode { Domain, Dof, Strain, Shaded };
+
+/// Which kind of unknown a vertex is (drawn as dots in ColorMode::Dof).
+enum class DofClass : std::uint8_t { Internal, Duplicate, Corner };
+
+/// Everything to draw; spans must outlive the call to draw().
+struct Frame {
+  const Positions* positions = nullptr;         ///< |V| x 3, m
+  std::span<const Triangle> triangles;
+  std::span<const int> triangle_domain;         ///< per triangle; needed by Domain and Dof
+  std::span<const Rgb> domain_colors;           ///< per domain; see domain_palette()
+  std::span<const float> triangle_value;        ///< per triangle; needed by Strain
+  std::span<const DofClass> vertex_class;       ///< per vertex; needed by Dof
+};
+
+struct Camera {
+  Vec3 eye{1, 1, 2};
+  Vec3 target{0, 0, 0};
+  Vec3 up{0, 1, 0};
+  double fov_degrees = 35;  ///< vertical
+};
+
+/// A camera that frames the box [low, high] (m) from the given direction.
+Camera frame_box(const Vec3& low, const Vec3& high, double aspect, double azimuth_degrees,
+                 double elevation_degrees, double fov_degrees);
+
+struct Style {
+  ColorMode color = ColorMode::Domain;
+  bool borders = true;          ///< dark lines between domains
+  bool mesh_lines = false;
+  bool ground = true;           ///< ground plane with a soft shadow
+  std::optional<double> ground_height;  ///< m; absent: just below the mesh
+  bool ambient_occlusion = true;
+  int supersampling = 2;        ///< 1, 2 or 3 samples per pixel and axis
+  bool legend = true;           ///< colour bar and title where the mode has one
+  float value_low = 0, value_high = 0.1F;  ///< range of the colour bar (Strain)
+  std::string value_label = "strain";
+  std::string caption;          ///< small text in the lower left corner, e.g. "t = 0.25 s"
+};
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;  ///< 3 bytes per pixel, top row first
+};
+
+/// Where OpenGL comes from.
+enum class Provider { Auto, Osmesa, Egl };
+
+/// An offscreen OpenGL context and its buffers. One per thread; not thread-safe.
+class Renderer {
+ public:
+  /// \throws BackendError (exit code 6) that names the packages to install if no provider works;
+  ///         InputError if the size is not within 16x16 ... 8192x8192.
+  Renderer(Provider provider, int width, int height);
+  ~Renderer();
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+
+  /// Draws one frame. \throws BackendError if the GL reports an error.
+  Image draw(const Frame& frame, const Camera& camera, const Style& style);
+
+  /// "OSMesa 22.3.6 (llvmpipe ...)", for environment blocks.
+  [[nodiscard]] std::string description() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Providers with "works" or the reason why not (for `piecework doctor`).
+struct ProviderReport {
+  Provider provider;
+  bool works;
+  std::string detail;
+};
+std::vector<ProviderReport> probe_providers();
+
+/// Well-separated colours for `count` domains; adjacent ones (pairs of domain numbers) differ
+/// strongly. A function of its arguments only, so domains keep their colours from frame to frame.
+std::vector<Rgb> domain_palette(int count, std::span<const std::array<int, 2>> adjacent);
+
+}  // namespace piecework::render

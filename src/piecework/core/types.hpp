@@ -1,0 +1,30 @@
+#pragma once
+
+// The handful of types that every layer shares. SI units throughout.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+
+namespace piecework {
+
+using Vec2 = Eigen::Vector2d;
+using Vec3 = Eigen::Vector3d;
+using Mat2 = Eigen::Matrix2d;
+using Mat3 = Eigen::Matrix3d;
+using Mat32 = Eigen::Matrix<double, 3, 2>;
+
+/// |V| x 3, one row per vertex, row-major: x, y, z of a vertex are adjacent in memory.
+using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+/// Symmetric system matrix, both triangles stored, column-major, 32-bit indices.
+using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
+
+/// Vertex indices of one triangle, counter-clockwise seen from the front.
+using Triangle = std::array<int, 3>;
+using Triangles = std::vector<Triangle>;
+
+}  // namespace piecework

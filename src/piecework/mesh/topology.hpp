@@ -1,0 +1,49 @@
+#pragma once
+
+// Edges, hinges, components and adjacency of triangle meshes.
+
+#include <array>
+#include <vector>
+
+#include <piecework/core/types.hpp>
+
+namespace piecework::mesh {
+
+/// An undirected edge with the triangles on its two sides.
+struct Edge {
+  std::array<int, 2> vertices;   ///< v0 < v1
+  std::array<int, 2> triangles;  ///< t0 < t1; t1 == -1 on the border
+};
+
+/// Two triangles that share an edge. Vertices: the shared edge (x0, x1), then the vertex opposite
+/// it in triangle t0 (x2) and in t1 (x3), as in [Bergou et al. 2006].
+struct Hinge {
+  std::array<int, 4> vertices;
+  std::array<int, 2> triangles;  ///< t0 < t1
+};
+
+/// All edges, sorted by (v0, v1).
+/// \pre every edge has at most two triangles (validate() refuses other meshes).
+std::vector<Edge> find_edges(const Triangles& triangles);
+
+/// One hinge per interior edge, in the order of find_edges().
+std::vector<Hinge> find_hinges(const Triangles& triangles, const std::vector<Edge>& edges);
+
+/// Component number of each triangle; triangles that share an edge are in one component.
+/// Components are numbered by their first triangle. Returns their number.
+int edge_components(const Triangles& triangles, const std::vector<Edge>& edges,
+                    std::vector<int>& component);
+
+/// Vertices on border edges, ascending.
+std::vector<int> border_vertices(const std::vector<Edge>& edges);
+
+/// Compressed rows: items of row r are item[begin[r]] ... item[begin[r + 1] - 1].
+struct Adjacency {
+  std::vector<int> begin;
+  std::vector<int> item;
+};
+
+/// Triangles around each vertex, ascending.
+Adjacency vertex_triangles(const Triangles& triangles, int num_vertices);
+
+}  // namespace piecework::mesh
