@@ -9,6 +9,19 @@
 
 namespace piecework::mesh {
 
+/// One side of one triangle: the edge (v0, v1), v0 < v1, as seen from `triangle`.
+struct HalfEdge {
+  int v0;
+  int v1;
+  int triangle;
+  bool forward;  ///< the triangle runs through it from v0 to v1
+};
+
+/// All triangle sides, sorted by (v0, v1, triangle): the sides of one edge are neighbours. Works on
+/// any triangles with indices >= 0, non-manifold ones included (a side of a triangle that names a
+/// vertex twice may have v0 == v1).
+std::vector<HalfEdge> sorted_half_edges(const Triangles& triangles);
+
 /// An undirected edge with the triangles on its two sides.
 struct Edge {
   std::array<int, 2> vertices;   ///< v0 < v1
