@@ -47,4 +47,9 @@ function(piecework_test)
     PIECEWORK_PROGRAM="${CMAKE_BINARY_DIR}/bin/piecework")
   gtest_discover_tests(piecework_${T_NAME}_test
     PROPERTIES LABELS ${T_LABEL} TIMEOUT 900 DISCOVERY_TIMEOUT 120)
+  # All test programs of one label, say `unit_tests`: what the sanitizer runs build.
+  if(NOT TARGET ${T_LABEL}_tests)
+    add_custom_target(${T_LABEL}_tests)
+  endif()
+  add_dependencies(${T_LABEL}_tests piecework_${T_NAME}_test)
 endfunction()

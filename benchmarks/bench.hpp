@@ -1,0 +1,43 @@
+#pragma once
+
+// What every benchmark driver shares; bench_main.cpp holds main() and this header's functions.
+
+#include <string>
+
+#include <benchmark/benchmark.h>
+
+namespace piecework::bench {
+
+/// True under --quick: drivers then take small sizes and few repetitions, so that a run takes
+/// seconds. It shows that the driver works and that its results are valid; its times mean nothing.
+/// Valid inside benchmarks and Registration functions, not in static initialisers.
+bool quick();
+
+/// Runs `function` after the command line is read and before the benchmarks start, so that what
+/// it registers may depend on quick(). To be a static object of a driver:
+///
+///     const Registration registration([] {
+///       benchmark::RegisterBenchmark("solve", solve)->Arg(quick() ? 1000 : 199809);
+///     });
+class Registration {
+ public:
+  explicit Registration(void (*function)());
+};
+
+/// Ends a benchmark because its result is invalid; the program then exits with 5.
+/// Leave the benchmark's function after the call.
+void fail(benchmark::State& state, const std::string& reason);
+
+/// Ends a benchmark that makes no sense on this machine (say, more threads than cores). The reason
+/// is shown; the program's exit code stays as it is. Leave the benchmark's function after the call.
+void skip(benchmark::State& state, const std::string& reason);
+
+/// Makes the compiler believe that `value` is read, so that it computes it. Instead of
+/// benchmark::DoNotOptimize(), which in 1.7.1 lets g++ 12 overwrite an lvalue with garbage
+/// (seen here on a double; their constraint is "+m,r").
+template <class T>
+void keep(const T& value) {
+  asm volatile("" : : "m"(value) : "memory");
+}
+
+}  // namespace piecework::bench

@@ -1,0 +1,177 @@
+#pragma once
+
+// Comparing two pieces of code on a machine that other work disturbs: they are timed alternately
+// inside one loop, so that both see the same disturbance, and judged by medians with intervals
+// from order statistics. Never the best run alone, never mean +- deviation of skewed times.
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <ctime>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace piecework::bench {
+
+/// Fewest samples that have an interval of 95 %: with 5, even [min, max] holds the median with
+/// 1 - 2 * 0.5^5 = 93.8 % only.
+inline constexpr std::size_t kMinSamplesForInterval = 6;
+
+/// Shortest call, s, whose processor time means something: the kernel brings the clocks of a
+/// process's other threads up to date once a tick (up to 10 ms), so that shorter calls get the
+/// time of their neighbours (seen here: 2.9 "busy threads" in a plain loop).
+inline constexpr double kMinSecondsForCpuTime = 0.02;
+
+/// Median of n samples and the interval that holds the true median with at least 95 %.
+struct MedianInterval {
+  double median = std::numeric_limits<double>::quiet_NaN();  ///< NaN without samples
+  double low = -std::numeric_limits<double>::infinity();     ///< -inf if n < 6
+  double high = std::numeric_limits<double>::infinity();     ///< inf if n < 6
+  std::size_t count = 0;
+};
+
+/// The largest r such that [r-th smallest, r-th largest] of n samples holds the median with at
+/// least 95 %; 0 if there is none. The probability is 1 - 2 P(Binomial(n, 1/2) < r), whatever the
+/// distribution of the samples.
+inline std::size_t median_interval_rank(std::size_t n) {
+  const auto count = static_cast<double>(n);
+  double tail = 0;  // P(Binomial < rank + 1)
+  std::size_t rank = 0;
+  for (;; ++rank) {
+    const auto k = static_cast<double>(rank);
+    tail += std::exp(std::lgamma(count + 1) - std::lgamma(k + 1) - std::lgamma(count - k + 1) -
+                     count * std::log(2.0));
+    if (2 * tail > 0.05 || 2 * (rank + 1) > n) return rank;
+  }
+}
+
+/// Median (mean of the middle two for even n) and its interval.
+inline MedianInterval median_interval(std::vector<double> samples) {
+  MedianInterval result;
+  const std::size_t n = samples.size();
+  result.count = n;
+  if (n == 0) return result;
+  std::sort(samples.begin(), samples.end());
+  result.median = 0.5 * (samples[(n - 1) / 2] + samples[n / 2]);
+  const std::size_t rank = median_interval_rank(n);
+  if (n >= kMinSamplesForInterval && rank > 0) {
+    result.low = samples[rank - 1];
+    result.high = samples[n - rank];
+  }
+  return result;
+}
+
+/// Wall and processor time of this process (all threads), s.
+struct ProcessClock {
+  static double wall() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  }
+  static double cpu() {
+    std::timespec t{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  }
+};
+
+/// Times A and B in the order A B, B A, A B, ... and keeps every sample. Single-threaded use; A
+/// and B themselves may use threads. In a benchmark:
+///
+///     InterleavedTimer timer;
+///     for (auto _ : state) {
+///       timer.sample([&] { ours(); }, [&] { baseline(); });
+///       state.SetIterationTime(timer.last_a());
+///     }
+///     timer.write(state.counters);   // register with ->UseManualTime()
+///
+/// One unmeasured call of both before the loop warms caches. Setup belongs outside of A and B.
+/// Register slow benchmarks with ->Iterations(n), n >= 6: one iteration gives no interval.
+template <class Clock>
+class BasicInterleavedTimer {
+ public:
+  /// Times one call of each, swapping the order from call to call.
+  template <class A, class B>
+  void sample(A&& a, B&& b) {
+    if (a_.wall.size() % 2 == 0) {
+      a_.time(a);
+      b_.time(b);
+    } else {
+      b_.time(b);
+      a_.time(a);
+    }
+  }
+
+  /// Seconds of the newest call of A; at least one sample must have been taken.
+  [[nodiscard]] double last_a() const { return a_.wall.back(); }
+
+  [[nodiscard]] MedianInterval a_seconds() const { return median_interval(a_.wall); }
+  [[nodiscard]] MedianInterval b_seconds() const { return median_interval(b_.wall); }
+
+  /// median(A) / median(B): below 1 where A is faster.
+  [[nodiscard]] double ratio_of_medians() const { return a_seconds().median / b_seconds().median; }
+
+  /// Median and interval of the ratios A / B of the single pairs. The two of a pair ran next to
+  /// each other, so slow disturbance cancels; a gate looks at `low`.
+  [[nodiscard]] MedianInterval paired_ratio() const {
+    std::vector<double> ratios(a_.wall.size());
+    std::transform(a_.wall.begin(), a_.wall.end(), b_.wall.begin(), ratios.begin(),
+                   [](double a, double b) { return a / b; });
+    return median_interval(std::move(ratios));
+  }
+
+  /// Processor time / wall time: the number of busy threads. Well below the threads in use, the
+  /// samples were disturbed by other work or waited. See kMinSecondsForCpuTime.
+  [[nodiscard]] double a_cpu_per_wall() const { return a_.cpu_seconds / a_.wall_seconds; }
+  [[nodiscard]] double b_cpu_per_wall() const { return b_.cpu_seconds / b_.wall_seconds; }
+
+  /// Writes all of the above to a map of names to numbers, times in ms: benchmark::UserCounters.
+  /// What has no meaning is left out: intervals of n < 6, processor times of short calls.
+  template <class Counters>
+  void write(Counters& counters) const {
+    write_interval(counters, "ours_ms", a_seconds(), 1e3);
+    write_interval(counters, "base_ms", b_seconds(), 1e3);
+    write_interval(counters, "paired_ratio", paired_ratio(), 1.0);
+    counters["ratio"] = ratio_of_medians();
+    counters["n"] = static_cast<double>(a_.wall.size());
+    if (std::min(a_seconds().median, b_seconds().median) < kMinSecondsForCpuTime) return;
+    counters["ours_cpu_per_wall"] = a_cpu_per_wall();
+    counters["base_cpu_per_wall"] = b_cpu_per_wall();
+  }
+
+ private:
+  struct Series {
+    std::vector<double> wall;
+    double wall_seconds = 0;
+    double cpu_seconds = 0;
+
+    template <class Function>
+    void time(Function& function) {
+      const double cpu = Clock::cpu();
+      const double start = Clock::wall();
+      function();
+      wall.push_back(Clock::wall() - start);
+      wall_seconds += wall.back();
+      cpu_seconds += Clock::cpu() - cpu;
+    }
+  };
+
+  template <class Counters>
+  static void write_interval(Counters& counters, const char* name, const MedianInterval& interval,
+                             double scale) {
+    const std::string prefix(name);
+    counters[prefix] = scale * interval.median;
+    if (interval.count < kMinSamplesForInterval) return;
+    counters[prefix + "_low"] = scale * interval.low;
+    counters[prefix + "_high"] = scale * interval.high;
+  }
+
+  Series a_;
+  Series b_;
+};
+
+using InterleavedTimer = BasicInterleavedTimer<ProcessClock>;
+
+}  // namespace piecework::bench
