@@ -1,0 +1,435 @@
+#pragma once
+
+// Private to the module: the one declaration of every key of a scene. A visitor
+// is handed each key with the member it fills; the reader, the resolved scene,
+// the JSON Schema and the reference page are four visitors. Defaults are those
+// of the structs in scene.hpp.
+//
+// A visitor V has:
+//   void about(const char* title, const char* doc)              once, first,
+//   per struct void value(const Key&, T& member, const Range& = {})        T:
+//   double, int, bool, std::string,
+//                                                    std::array, std::vector,
+//                                                    std::optional of these
+//   void choice(const Key&, std::string& member, const Choices&)
+//   void object(const Key&, T& or std::optional<T>& member)     nested struct
+//   void list(const Key&, std::vector<T>& member)               list of structs
+//   void map(const Key&, std::map<std::string, T>& member)      structs by name
+//   void exactly_one(const Names&) / void at_least_one(const Names&)   last:
+//   keys that must be given
+//
+// Keys are declared in the order in which they are best read; a key's `applies`
+// may depend on members declared before it.
+
+#include <initializer_list>
+#include <limits>
+#include <string_view>
+#include <vector>
+
+#include <piecework/scene/scene.hpp>
+
+namespace piecework::scene {
+
+struct Key {
+  const char* name;
+  const char* doc;
+  const char* unit = "";
+  bool required = false;
+  /// False: giving the key is an error, since other keys make it meaningless.
+  bool applies = true;
+  const char* condition = "";  ///< when it applies, in words
+  bool on_by_default = false;  ///< an optional that only null switches off
+  const char* since = "0.1";   ///< version of Piecework that knows the key first
+
+  [[nodiscard]] Key needed() const {
+    Key key = *this;
+    key.required = true;
+    return key;
+  }
+  [[nodiscard]] Key on() const {
+    Key key = *this;
+    key.on_by_default = true;
+    return key;
+  }
+  [[nodiscard]] Key only(bool now, const char* when) const {
+    Key key = *this;
+    key.applies = now;
+    key.condition = when;
+    return key;
+  }
+};
+
+/// Limits of a number, or of each number of a list; of the length of a text or
+/// list.
+struct Range {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool above = false;      ///< min itself is outside
+  bool not_empty = false;  ///< texts and lists
+};
+
+constexpr Range between(double min, double max) { return {min, max, false, false}; }
+constexpr Range above(double min, double max) { return {min, max, true, false}; }
+constexpr Range not_empty() {
+  Range range;
+  range.not_empty = true;
+  return range;
+}
+constexpr Range indices() { return {0, std::numeric_limits<int>::max(), false, true}; }
+
+/// Sane limits, chosen so that squares and products stay finite.
+inline constexpr Range kLengths{-1e6, 1e6, false, false};  // m
+inline constexpr Range kTimes{0, 1e9, false, false};       // s
+
+struct Choice {
+  const char* name;
+  const char* doc;
+};
+using Choices = std::vector<Choice>;
+using Names = std::initializer_list<const char*>;
+
+template <class V>
+void fields(V& v, Step& s) {
+  v.about("Step", "Time stepping: implicit Euler with a fixed step.");
+  v.value({"h", "time step", "s"}, s.h, above(0, 10));
+  v.value({"steps", "steps to simulate"}, s.steps, between(0, 1e9));
+  v.value({"output_every", "steps per frame"}, s.output_every, between(1, 1e9));
+}
+
+template <class V>
+void fields(V& v, Material& m) {
+  v.about("Material",
+          "What a cloth is made of. The membrane stiffness is k_s "
+          "= stretching * thickness (N/m): "
+          "with the default thickness of 1 m, stretching is k_s "
+          "itself, as in the paper's tables.");
+  v.value({"density", "mass per area", "kg/m^2"}, m.density, above(0, 1e6));
+  v.value({"stretching", "Young's modulus Y of the membrane", "Pa"}, m.stretching, above(0, 1e15));
+  v.value({"thickness", "thickness t; scales stretching only", "m"}, m.thickness, above(0, 1e3));
+  v.value({"bending",
+           "flexural rigidity D = Y t^3 / (12 (1 - nu^2)), not derived from "
+           "thickness; hinges have "
+           "the weight D / (A0 + A1), A0 and A1 the areas of the two "
+           "triangles; absent: no bending",
+           "N m"},
+          m.bending, above(0, 1e12));
+}
+
+template <class V>
+void fields(V& v, Wind& w) {
+  v.about("Wind", "Moving air that drags the cloth along. Absent: no air at all.");
+  v.value({"velocity", "velocity of the air", "m/s"}, w.velocity, between(-1e3, 1e3));
+  v.value({"air_density", "mass per volume of the air", "kg/m^3"}, w.air_density, above(0, 1e4));
+  v.value({"normal_drag", "drag coefficient for flow through the cloth"}, w.normal_drag,
+          between(0, 1e3));
+  v.value({"tangential_drag", "drag coefficient for flow along the cloth"}, w.tangential_drag,
+          between(0, 1e3));
+  v.value({"gust_amplitude",
+           "strength a of gusts: at time t the air moves "
+           "with velocity * (1 + a sin(2 pi t / "
+           "gust_period))"},
+          w.gust_amplitude, between(0, 100));
+  v.value({"gust_period", "time between gusts", "s"}, w.gust_period, above(0, 1e6));
+}
+
+template <class V>
+void fields(V& v, Region& r) {
+  v.about("Region",
+          "Vertices of a cloth: all that any of these keys names. "
+          "Positions are those of the start "
+          "shape, after scale, rotate and translate.");
+  v.value({"vertices", "vertex numbers from 0, in the order of the mesh's file"}, r.vertices,
+          indices());
+  v.value({"sets",
+           "named sets: border (every mesh); corners, left, right, bottom, top "
+           "(sheet, strip); "
+           "bottom, top (tube); center (disc); and the groups of a file"},
+          r.sets, not_empty());
+  v.value({"box", "[[x, y, z], [x, y, z]]: lowest and highest corner of a box", "m"}, r.box,
+          kLengths);
+  v.value({"sphere", "[x, y, z, radius] of a ball", "m"}, r.sphere, kLengths);
+  v.at_least_one({"vertices", "sets", "box", "sphere"});
+}
+
+template <class V>
+void fields(V& v, Pin& p) {
+  v.about("Pin",
+          "Vertices that are held, or moved by script: from start to "
+          "stop they turn about an axis "
+          "and are carried along a velocity (the rotation acts first), "
+          "before and after they stand "
+          "still; after release they are free.");
+  v.object(Key{"region", "vertices to hold"}.needed(), p.region);
+  v.value({"velocity", "velocity of the motion", "m/s"}, p.velocity, between(-1e4, 1e4));
+  v.value({"axis", "direction of the axis of rotation, of any length but 0"}, p.axis, kLengths);
+  v.value({"center", "a point on the axis of rotation", "m"}, p.center, kLengths);
+  v.value({"rate", "angular velocity about the axis", "rad/s"}, p.rate, between(-1e4, 1e4));
+  v.value({"start", "time at which the motion begins", "s"}, p.start, kTimes);
+  v.value({"stop", "time at which the motion ends; absent: never", "s"}, p.stop, kTimes);
+  v.value({"release", "time at which the vertices become free; absent: never", "s"}, p.release,
+          kTimes);
+}
+
+template <class V>
+void fields(V& v, Load& l) {
+  v.about("Load", "A force that acts on some vertices for a while.");
+  v.object(Key{"region", "vertices it acts on"}.needed(), l.region);
+  v.value(
+      Key{"force", "total force, shared by the vertices in proportion to their mass", "N"}.needed(),
+      l.force, between(-1e9, 1e9));
+  v.value({"start", "time at which it begins", "s"}, l.start, kTimes);
+  v.value({"stop", "time at which it ends; absent: never", "s"}, l.stop, kTimes);
+}
+
+inline const Choices& generators() {
+  static const Choices choices = {{"sheet",
+                                   "width x height in the xz plane, columns x rows vertices, "
+                                   "first vertex at the origin, x "
+                                   "fastest; sets corners, left (x = 0), right, bottom (z = 0), "
+                                   "top, border"},
+                                  {"strip", "a sheet meant to be long; the same keys and sets"},
+                                  {"tube",
+                                   "open cylinder around y: radius, height, columns around, rows "
+                                   "along; sets bottom, "
+                                   "top, border"},
+                                  {"disc",
+                                   "flat disc in the xz plane: radius, rows rings, columns around "
+                                   "the rim; sets border, "
+                                   "center"},
+                                  {"quilt",
+                                   "patches_x x patches_y sheets in width x height, each meshed "
+                                   "in its own way, one "
+                                   "group per patch"}};
+  return choices;
+}
+
+template <class V>
+void fields(V& v, Mesh& m) {
+  v.about("Mesh", "Triangles, made by a generator or read from a file: one of the two.");
+  v.choice({"generator", "shape to make"}, m.generator, generators());
+  v.value({"file",
+           "mesh file (OBJ, PLY, STL, glTF); a relative name starts at "
+           "the folder of the scene"},
+          m.file, not_empty());
+  v.exactly_one({"generator", "file"});
+  const bool made = m.file.empty(), read = m.generator.empty();
+  const char* if_made = "generator";
+  const char* if_read = "file";
+  v.value(Key{"width", "extent along x (sheet, strip, quilt)", "m"}.only(made, if_made), m.width,
+          above(0, 1e6));
+  v.value(
+      Key{"height", "extent along z (sheet, strip, quilt) or y (tube)", "m"}.only(made, if_made),
+      m.height, above(0, 1e6));
+  v.value(Key{"radius", "radius (tube, disc)", "m"}.only(made, if_made), m.radius, above(0, 1e6));
+  v.value(Key{"columns", "vertices along the width, or around (tube, disc)"}.only(made, if_made),
+          m.columns, between(2, 1e6));
+  v.value(Key{"rows", "vertices along the height; rings (disc)"}.only(made, if_made), m.rows,
+          between(2, 1e6));
+  v.choice(Key{"pattern", "triangulation (sheet, strip)"}.only(made, if_made), m.pattern,
+           {{"alternating", "diagonals alternate from cell to cell"},
+            {"one_diagonal", "all diagonals one way: stiffness depends on direction"},
+            {"delaunay",
+             "jittered grid, edges flipped until Delaunay: no "
+             "preferred direction"}});
+  v.value(Key{"jitter", "how far inner vertices of the delaunay pattern move, in cells"}.only(
+              made, if_made),
+          m.jitter, between(0, 0.5));
+  v.value(Key{"seed", "seed of the jitter"}.only(made, if_made), m.seed,
+          between(0, std::numeric_limits<int>::max()));
+  v.value(Key{"patches_x", "patches along the width (quilt)"}.only(made, if_made), m.patches_x,
+          between(1, 1000));
+  v.value(Key{"patches_y", "patches along the height (quilt)"}.only(made, if_made), m.patches_y,
+          between(1, 1000));
+  v.value(Key{"units", "what one unit of the file measures", "m"}.only(read, if_read), m.units,
+          above(0, 1e6));
+  v.choice(Key{"up_axis", "axis that points up in the file; it becomes y"}.only(read, if_read),
+           m.up_axis, {{"x", "x is up"}, {"y", "y is up"}, {"z", "z is up"}});
+  v.value(Key{"repair",
+              "mend what can be mended safely (zero-area and duplicate "
+              "triangles, isolated vertices, "
+              "orientation), with a note; false: such a mesh is an error"}
+              .only(read, if_read),
+          m.repair);
+  v.value(Key{"weld", "merge vertices of one group at the same position"}.only(read, if_read),
+          m.weld);
+}
+
+template <class V>
+void fields(V& v, Cloth& c) {
+  v.about("Cloth",
+          "One piece of cloth. Its start shape is the mesh scaled, "
+          "then rotated, then translated; "
+          "its rest shape is what it is unstrained.");
+  v.value({"name", "unique among the cloths"}, c.name, not_empty());
+  v.object(Key{"mesh", "triangles"}.needed(), c.mesh);
+  v.value(Key{"material", "name of an entry of materials"}.needed(), c.material, not_empty());
+  v.choice({"rest", "rest shape"}, c.rest,
+           {{"self", "the mesh as it was made or read, before scale"},
+            {"uv", "flat: the texture coordinates of the mesh, in metres"},
+            {"file", "positions from rest_file"}});
+  v.value(Key{"rest_file",
+              "mesh file of the same topology; a relative name "
+              "starts at the folder of the scene"}
+              .only(c.rest == "file", "\"rest\": \"file\""),
+          c.rest_file, not_empty());
+  v.value({"translate", "shift of the start shape", "m"}, c.translate, kLengths);
+  v.value({"rotate", "rotation of the start shape about x, then y, then z", "degrees"}, c.rotate,
+          between(-3600, 3600));
+  v.value({"scale", "factors along x, y and z of the start shape, not of the rest shape"}, c.scale,
+          above(0, 1e6));
+  v.value({"velocity", "velocity at the start", "m/s"}, c.velocity, between(-1e4, 1e4));
+  v.list({"pins", "vertices that are held or moved"}, c.pins);
+  v.list({"loads", "forces on some of the vertices"}, c.loads);
+}
+
+template <class V>
+void fields(V& v, Solver& s) {
+  v.about("Solver",
+          "How a step is solved; changes the speed, not the result "
+          "that is approached.");
+  v.choice({"method", "time integrator"}, s.method,
+           {{"vanilla_pd",
+             "projective dynamics: local and global steps in "
+             "turn, not accelerated"}});
+  v.choice({"global", "global solve"}, s.global,
+           {{"single", "one sparse Cholesky factor of the whole system (CHOLMOD)"}});
+  v.choice({"local", "local step"}, s.local,
+           {{"jacobi", "all constraints projected at the same positions, in parallel"}});
+  v.value({"domains", "domains to divide the cloths into (1: undivided)"}, s.domains,
+          between(1, 65536));
+  v.value({"threads", "worker threads; 0: what affinity and cgroup quota allow"}, s.threads,
+          between(0, 1024));
+}
+
+template <class V>
+void fields(V& v, Quality& q) {
+  v.about("Quality", "How accurately each step is solved.");
+  v.choice({"stop", "rule that ends the iterations of a step"}, q.stop,
+           {{"error",
+             "estimated position error q / (1 - q) * max |dx| <= "
+             "tolerance * mean edge length; dx is "
+             "the latest increment, q the largest of the last 3 "
+             "ratios of successive increments"},
+            {"gradient",
+             "rms nodal force residual over free vertices <= "
+             "tolerance * mean nodal weight"},
+            {"dx_2",
+             "2-norm of the increment over all vertices <= tolerance, "
+             "lengths in units of the "
+             "largest extent of the start shape's bounding box (the "
+             "paper's unit box)"},
+            {"dx_rms", "the same for the root mean square over the vertices"},
+            {"dx_inf", "the same for the largest increment of a vertex"},
+            {"iterations", "always max_iterations; tolerance is not used"}});
+  v.value({"tolerance",
+           "threshold, a pure number whose scale depends on stop: mean edge "
+           "lengths (error), mean "
+           "nodal weights (gradient), unit boxes (dx_2, dx_rms, dx_inf)"},
+          q.tolerance, above(0, 1e6));
+  v.value({"max_iterations", "the step ends after so many iterations, converged or not"},
+          q.max_iterations, between(1, 1e9));
+  v.value({"min_iterations", "the rule is not asked before so many iterations"}, q.min_iterations,
+          between(1, 1e9));
+}
+
+template <class V>
+void fields(V& v, Camera& c) {
+  v.about("Camera",
+          "Point of view of the pictures. Without position it frames "
+          "all frames itself.");
+  v.value({"position", "eye; absent: chosen from azimuth and elevation", "m"}, c.position,
+          kLengths);
+  v.value({"target", "point in the middle of the picture; absent: the middle of the cloths", "m"},
+          c.target, kLengths);
+  v.value({"fov", "vertical field of view", "degrees"}, c.fov, between(1, 170));
+  v.value({"azimuth", "direction of the eye about y, for automatic framing", "degrees"}, c.azimuth,
+          between(-360, 360));
+  v.value({"elevation", "height of the eye above the horizon, for automatic framing", "degrees"},
+          c.elevation, between(-90, 90));
+  v.value({"ground", "height of the ground plane; absent: below the cloths", "m"}, c.ground,
+          kLengths);
+}
+
+template <class V>
+void fields(V& v, Render& r) {
+  v.about("Render", "What the pictures show.");
+  v.choice({"color", "colour of the triangles"}, r.color,
+           {{"domain", "one colour per domain"},
+            {"dof", "domains pale, shared vertices as dots: duplicates and corners"},
+            {"strain", "largest principal strain, with a colour bar"},
+            {"shaded", "one colour, lit"}});
+  v.value({"size", "width and height", "pixels"}, r.size, between(16, 8192));
+  v.value({"borders", "dark lines between domains"}, r.borders);
+  v.value({"mesh_lines", "thin lines along all edges"}, r.mesh_lines);
+}
+
+inline const Choices& quantities() {
+  static const Choices choices = {
+      {"lowest_y", "lowest height of a vertex, m"},
+      {"highest_y", "greatest height of a vertex, m"},
+      {"center_x", "centre of mass, x, m"},
+      {"center_y", "centre of mass, y, m"},
+      {"center_z", "centre of mass, z, m"},
+      {"vertex_x", "x of the vertex, m"},
+      {"vertex_y", "y of the vertex, m"},
+      {"vertex_z", "z of the vertex, m"},
+      {"max_strain", "largest |sigma - 1| over the triangles, sigma a principal stretch"},
+      {"mean_strain", "mean over the triangles of the largest |sigma - 1|"},
+      {"kinetic_energy", "kinetic energy, J"},
+      {"max_speed", "largest speed of a vertex, m/s"},
+      {"momentum_x", "linear momentum, x, kg m/s"},
+      {"momentum_y", "linear momentum, y, kg m/s"},
+      {"momentum_z", "linear momentum, z, kg m/s"},
+      {"reaction_force_y", "total force of the pins on the cloth, y, N"},
+      {"gradient",
+       "largest over the steps so far: rms nodal force residual "
+       "over free vertices / "
+       "mean nodal weight"},
+      {"iterations", "mean iterations per step so far"},
+      {"converged_steps", "fraction of the steps so far that met the stop rule"}};
+  return choices;
+}
+
+template <class V>
+void fields(V& v, Expectation& e) {
+  v.about("Expectation", "What must be true of the run: min <= quantity <= max at a time.");
+  v.choice(Key{"quantity", "what is measured"}.needed(), e.quantity, quantities());
+  v.value({"at", "time; absent: the end of the run", "s"}, e.at, kTimes);
+  v.value(Key{"vertex", "vertex number, in the order of the mesh's file"}.only(
+              e.quantity.starts_with("vertex_"), "a vertex_* quantity"),
+          e.vertex, indices());
+  const bool of_run =
+      e.quantity == "gradient" || e.quantity == "iterations" || e.quantity == "converged_steps";
+  v.value(Key{"cloth", "name of the cloth that is measured; absent: all together"}.only(
+              !of_run, "a quantity other than gradient, iterations, converged_steps"),
+          e.cloth, not_empty());
+  v.value({"min", "lower bound, in the unit of the quantity"}, e.min);
+  v.value({"max", "upper bound, in the unit of the quantity"}, e.max);
+  v.at_least_one({"min", "max"});
+}
+
+template <class V>
+void fields(V& v, Scene& s) {
+  v.about("Scene", "The whole file.");
+  v.value({"name", "name in reports; absent: the file's name without .json"}, s.name, not_empty());
+  v.value({"description", "one sentence for people"}, s.description);
+  v.object({"step", "time stepping"}, s.step);
+  v.value(Key{"gravity", "acceleration of free fall; null: off", "m/s^2"}.on(), s.gravity,
+          between(-1e6, 1e6));
+  v.object({"wind", "moving air; absent: off"}, s.wind);
+  v.value({"damping", "rate at which velocities decay; absent: off", "1/s"}, s.damping,
+          above(0, 1e6));
+  v.object({"solver", "how a step is solved"}, s.solver);
+  v.object({"quality", "how accurately a step is solved"}, s.quality);
+  v.map(Key{"materials", "materials by name; cloths share them"}.needed(), s.materials);
+  v.list(Key{"cloths", "pieces of cloth, at least one"}.needed(), s.cloths);
+  v.object({"camera", "point of view"}, s.camera);
+  v.object({"render", "what the pictures show"}, s.render);
+  v.list({"expect",
+          "what must be true of the run; piecework run reports each "
+          "and the tests check "
+          "those of the shipped scenes"},
+         s.expect);
+}
+
+}  // namespace piecework::scene

@@ -1,0 +1,136 @@
+#include <piecework/scene/scene_rules.hpp>
+
+#include <algorithm>
+#include <set>
+
+#include <fmt/format.h>
+
+#include <piecework/scene/nearest.hpp>
+
+namespace piecework::scene {
+namespace {
+
+/// One part of the scene and where it is; reports faults in it.
+class Part {
+ public:
+  Part(const Document& document, std::string pointer)
+      : document_(document), pointer_(std::move(pointer)) {}
+
+  [[nodiscard]] Part in(std::string_view key) const {
+    return {document_, pointer_ + pointer_step(key)};
+  }
+  [[nodiscard]] Part in(std::size_t index) const { return in(std::to_string(index)); }
+
+  void require(bool holds, const std::string& problem, const std::string& remedy) const {
+    if (!holds) fail(document_, pointer_, problem, remedy);
+  }
+
+ private:
+  const Document& document_;
+  std::string pointer_;
+};
+
+void check_order(const Part& part, std::optional<double> first, std::optional<double> second,
+                 const char* first_name, const char* second_name) {
+  if (!first || !second) return;
+  part.require(*first <= *second,
+               fmt::format("{} ({}) is below {} ({})", second_name, *second, first_name, *first),
+               "exchange or correct them");
+}
+
+void check_region(const Region& region, const Part& part) {
+  if (region.box)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      part.in("box").require(
+          (*region.box)[0][axis] <= (*region.box)[1][axis],
+          fmt::format("the lowest corner is above the highest along {}", "xyz"[axis]),
+          "write [[lowest x, y, z], [highest x, y, z]]");
+  if (region.sphere)
+    part.in("sphere").in(3).require((*region.sphere)[3] > 0, "the radius must be above 0",
+                                    "write [x, y, z, radius]");
+}
+
+void check_cloth(const Cloth& cloth, const Scene& scene, const Part& part) {
+  std::vector<std::string> materials;
+  for (const auto& [name, material] : scene.materials) materials.push_back(name);
+  part.in("material")
+      .require(scene.materials.contains(cloth.material),
+               fmt::format("no material \"{}\" is defined", printable(cloth.material)),
+               suggestion(cloth.material, materials, "materials"));
+  part.require(cloth.rest != "file" || !cloth.rest_file.empty(),
+               "\"rest\" is \"file\" without a \"rest_file\"", "name the mesh of the rest shape");
+  for (std::size_t i = 0; i < cloth.pins.size(); ++i) {
+    const Pin& pin = cloth.pins[i];
+    const Part here = part.in("pins").in(i);
+    check_region(pin.region, here.in("region"));
+    check_order(here.in("stop"), pin.start, pin.stop, "start", "stop");
+    here.in("axis").require(pin.rate == 0 || pin.axis != std::array<double, 3>{0, 0, 0},
+                            "the axis of rotation has no direction",
+                            "write one, such as [0, 1, 0]");
+  }
+  for (std::size_t i = 0; i < cloth.loads.size(); ++i) {
+    const Part here = part.in("loads").in(i);
+    check_region(cloth.loads[i].region, here.in("region"));
+    check_order(here.in("stop"), cloth.loads[i].start, cloth.loads[i].stop, "start", "stop");
+  }
+}
+
+void check_cloths(const Scene& scene, const Part& part) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < scene.cloths.size(); ++i) {
+    const Cloth& cloth = scene.cloths[i];
+    part.in(i).in("name").require(names.insert(cloth.name).second,
+                                  fmt::format("a second cloth named \"{}\"", printable(cloth.name)),
+                                  "give each cloth its own \"name\"");
+    check_cloth(cloth, scene, part.in(i));
+  }
+}
+
+void check_expectation(const Expectation& expected, const Scene& scene, const Part& part) {
+  check_order(part.in("max"), expected.min, expected.max, "min", "max");
+  std::vector<std::string> names;
+  bool found = expected.cloth.empty();
+  for (const Cloth& cloth : scene.cloths) {
+    names.push_back(cloth.name);
+    found = found || cloth.name == expected.cloth;
+  }
+  part.in("cloth").require(found,
+                           fmt::format("no cloth is named \"{}\"", printable(expected.cloth)),
+                           suggestion(expected.cloth, names, "cloths"));
+  if (!expected.quantity.starts_with("vertex_")) return;
+  part.require(expected.vertex.has_value(),
+               fmt::format("{} does not say which vertex", expected.quantity),
+               "add \"vertex\", a number from 0");
+  part.require(!expected.cloth.empty() || scene.cloths.size() == 1,
+               fmt::format("{} does not say of which of the {} cloths", expected.quantity,
+                           scene.cloths.size()),
+               "add \"cloth\", the name of one");
+}
+
+/// A misspelt override must not pass as the definition of a new material.
+void check_overridden_materials(const Scene& scene, const Document& document, const Part& part) {
+  std::vector<std::string> used;
+  for (const Cloth& cloth : scene.cloths) used.push_back(cloth.material);
+  for (const Member& entry : *document.root.find("materials")->object())
+    part.in(entry.key).require(
+        entry.place.line > 0 || std::find(used.begin(), used.end(), entry.key) != used.end(),
+        fmt::format("no cloth uses a material \"{}\"", printable(entry.key)),
+        suggestion(entry.key, used, "materials"));
+}
+
+}  // namespace
+
+void check_rules(const Scene& scene, const Document& document) {
+  const Part root(document, "");
+  check_cloths(scene, root.in("cloths"));
+  check_overridden_materials(scene, document, root.in("materials"));
+  check_order(root.in("quality").in("max_iterations"), scene.quality.min_iterations,
+              scene.quality.max_iterations, "min_iterations", "max_iterations");
+  root.in("camera").in("target").require(
+      !scene.camera.position || scene.camera.position != scene.camera.target,
+      "the camera looks at its own position", "move \"target\" or \"position\"");
+  for (std::size_t i = 0; i < scene.expect.size(); ++i)
+    check_expectation(scene.expect[i], scene, root.in("expect").in(i));
+}
+
+}  // namespace piecework::scene
