@@ -80,16 +80,16 @@ with_progress() {
   while kill -0 "$pid" 2>/dev/null; do
     sleep 0.2
     waited=$((waited + 1))
-    [ $((waited % 100)) -ne 0 ] || say "  ... $((waited / 5)) s $(last_progress "$log")"
+    [ $((waited % 100)) -ne 0 ] || say "  $((waited / 5)) s$(last_progress "$log")"
   done
   wait "$pid" || status=$?
   trap - INT TERM
   return "$status"
 }
 
-# The newest step count of ninja ([12/340]) or ctest (12/340 Test) in a log.
+# The newest step count of ninja ("[12/340]") or ctest (" 12/340 Test") in a log, as ", 12/340".
 last_progress() {
-  tail -n 40 "$1" | grep -oE '^(\[[0-9]+/[0-9]+\]|[ ]*[0-9]+/[0-9]+ Test)' | tail -n 1 | tr -d ' Test' || true
+  tail -n 40 "$1" | sed -nE 's/^(\[|[ ]*)([0-9]+\/[0-9]+)(\]| Test).*/, \2/p' | tail -n 1
 }
 
 # configure PRESET: into build/PRESET.

@@ -67,9 +67,11 @@ gate_suites() {
   run_suite asan tests_of asan asan.xml unit
 }
 
-# failures_in LOG: what the failed tests of a ctest log printed, cut to 200 lines.
+# failures_in LOG: what the failed tests of a ctest log printed, cut to 40 lines each, 200 in all.
 failures_in() {
-  awk '/\*\*\*(Failed|Timeout|Exception|Not Run)/ { left = 25 } left-- > 0 && ++printed <= 200' "$1"
+  awk '/^ *Start +[0-9]+:|^ *[0-9]+\/[0-9]+ Test|% tests passed/ { left = 0 }
+       /\*\*\*(Failed|Timeout|Exception|Not Run$)/ { left = 40 }
+       left-- > 0 && ++printed <= 200' "$1"
 }
 
 # close_suites: the closing table; exits 1 if anything failed.
