@@ -13,7 +13,8 @@ namespace piecework::mesh {
 
 enum class ExportFormat { Ply, Obj, Vtp };
 
-/// One mesh of a frame: `document` as loaded, `positions` (|V| x 3, m) of its simulation vertices now.
+/// One mesh of a frame: `document` as loaded, `positions` (|V| x 3, m) of its simulation vertices
+/// now.
 struct ExportPart {
   const MeshDocument* document;
   Eigen::Ref<const Positions> positions;

@@ -18,16 +18,16 @@ enum class SheetPattern {
 
 /// Parameters of every generator; each uses the ones named in its line of GeneratorKind.
 struct GeneratorOptions {
-  double width = 1.0;    ///< m, along x
-  double height = 1.0;   ///< m, along z (sheets), y (tube)
-  int columns = 50;      ///< vertices along the width (tube: around)
-  int rows = 50;         ///< vertices along the height (disc: rings)
-  double radius = 0.5;   ///< m; tube, disc
+  double width = 1.0;   ///< m, along x
+  double height = 1.0;  ///< m, along z (sheets), y (tube)
+  int columns = 50;     ///< vertices along the width (tube: around)
+  int rows = 50;        ///< vertices along the height (disc: rings)
+  double radius = 0.5;  ///< m; tube, disc
   SheetPattern pattern = SheetPattern::Alternating;
-  double jitter = 0.3;   ///< fraction of the cell by which inner vertices of Delaunay sheets move
+  double jitter = 0.3;  ///< fraction of the cell by which inner vertices of Delaunay sheets move
   std::uint64_t seed = 1;
-  int patches_x = 2;     ///< quilt: patches along the width
-  int patches_y = 2;     ///< quilt: patches along the height
+  int patches_x = 2;  ///< quilt: patches along the width
+  int patches_y = 2;  ///< quilt: patches along the height
 };
 
 enum class GeneratorKind {
@@ -35,7 +35,8 @@ enum class GeneratorKind {
           ///< x fastest; sets: corners, left (x=0), right, bottom (z=0), top, border
   Strip,  ///< a Sheet meant to be long; same parameters and sets
   Tube,   ///< open cylinder around y; radius, height, columns x rows; sets: bottom, top, border
-  Disc,   ///< flat disc in the xz plane; radius, rows rings, columns around the rim; sets: border, center
+  Disc,   ///< flat disc in the xz plane; radius, rows rings, columns around the rim; sets: border,
+          ///< center
   Quilt,  ///< patches_x x patches_y sheets of width x height in all, each meshed with its own
           ///< density and pattern, conforming along shared borders, one group per patch
 };

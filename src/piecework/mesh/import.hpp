@@ -20,14 +20,17 @@ struct ImportOptions {
   double unit_in_metres = 1.0;  ///< what one unit of the file measures, m
   UpAxis up_axis = UpAxis::Y;   ///< axis that points up in the file; turned to y
   /// Mend what can be mended safely: drop zero-area, duplicate and out-of-manifold triangles and
-  /// isolated vertices, turn triangles to one orientation. Each repair is noted.
+  /// isolated vertices, split bow-tie vertices (the new ones come after all others), turn triangles
+  /// to one orientation. Each repair is noted.
   bool repair = false;
-  /// Merge vertices of one group at exactly the same position (UV and normal seams split them).
+  /// Merge vertices of one group at exactly the same position where the surface is split along
+  /// edges (UV and normal seams, STL). Inner vertices and mere contact points stay apart.
   bool weld = true;
   std::size_t max_triangles = kMaxTriangles;
 };
 
-/// Reads a mesh, welds it, checks it (and repairs it if asked).
+/// Reads a mesh, welds it, checks it (and repairs it if asked). Groups are the OBJ's g and o lines
+/// or the nodes of a glTF. Texture coordinates are taken as metres, whatever the unit.
 /// \throws InputError that names file, item and remedy: file missing, empty, truncated or of an
 ///         unknown kind; NaN or infinite coordinates; index out of range; zero-area triangles;
 ///         duplicate faces; edges with more than two triangles; vertices whose triangles do not

@@ -38,6 +38,32 @@ int find_root(std::vector<int>& parent, int item) {
   return item;
 }
 
+/// Makes the smaller root the root of both.
+void unite(std::vector<int>& parent, int a, int b) {
+  a = find_root(parent, a);
+  b = find_root(parent, b);
+  parent[std::max(a, b)] = std::min(a, b);
+}
+
+/// Corner number (3 per triangle) of `vertex` in triangle `t`.
+int corner_of(const Triangles& triangles, int t, int vertex) {
+  for (int k = 0; k < 2; ++k) {
+    if (triangles[t][k] == vertex) return 3 * t + k;
+  }
+  return 3 * t + 2;
+}
+
+/// Renumbers a union-find forest to 0, 1, ... by first member. Returns the number of sets.
+int number_sets(std::vector<int>& parent, std::vector<int>& number) {
+  number.resize(parent.size());
+  int count = 0;
+  for (int i = 0; i < static_cast<int>(parent.size()); ++i) {
+    const int root = find_root(parent, i);
+    number[i] = root == i ? count++ : number[root];
+  }
+  return count;
+}
+
 }  // namespace
 
 std::vector<HalfEdge> sorted_half_edges(const Triangles& triangles) {
@@ -99,18 +125,9 @@ int edge_components(const Triangles& triangles, const std::vector<Edge>& edges,
   std::vector<int> parent(triangles.size());
   std::iota(parent.begin(), parent.end(), 0);
   for (const Edge& edge : edges) {
-    if (edge.triangles[1] < 0) continue;
-    const int a = find_root(parent, edge.triangles[0]);
-    const int b = find_root(parent, edge.triangles[1]);
-    parent[std::max(a, b)] = std::min(a, b);  // the root is the first triangle of its component
+    if (edge.triangles[1] >= 0) unite(parent, edge.triangles[0], edge.triangles[1]);
   }
-  component.resize(triangles.size());
-  int count = 0;
-  for (int t = 0; t < static_cast<int>(triangles.size()); ++t) {
-    const int root = find_root(parent, t);
-    component[t] = root == t ? count++ : component[root];
-  }
-  return count;
+  return number_sets(parent, component);
 }
 
 std::vector<int> border_vertices(const std::vector<Edge>& edges) {
@@ -122,6 +139,22 @@ std::vector<int> border_vertices(const std::vector<Edge>& edges) {
   std::sort(border.begin(), border.end());
   border.erase(std::unique(border.begin(), border.end()), border.end());
   return border;
+}
+
+std::vector<int> corner_fans(const Triangles& triangles, const std::vector<HalfEdge>& sides) {
+  std::vector<int> parent(3 * triangles.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  for (std::size_t i = 1; i < sides.size(); ++i) {
+    const HalfEdge& a = sides[i - 1];
+    const HalfEdge& b = sides[i];
+    if (a.v0 != b.v0 || a.v1 != b.v1) continue;
+    for (int vertex : {a.v0, a.v1})
+      unite(parent, corner_of(triangles, a.triangle, vertex),
+            corner_of(triangles, b.triangle, vertex));
+  }
+  std::vector<int> fan;
+  number_sets(parent, fan);
+  return fan;
 }
 
 Adjacency vertex_triangles(const Triangles& triangles, int num_vertices) {

@@ -50,6 +50,12 @@ int edge_components(const Triangles& triangles, const std::vector<Edge>& edges,
 /// Vertices on border edges, ascending.
 std::vector<int> border_vertices(const std::vector<Edge>& edges);
 
+/// Fan number of every corner (3 per triangle, in triangle order): corners of one vertex whose
+/// triangles hang together through edges at that vertex are in one fan. A vertex of a manifold has
+/// one fan. Fans are numbered by their first corner. Works on non-manifold meshes.
+/// \param sides  sorted_half_edges(triangles)
+std::vector<int> corner_fans(const Triangles& triangles, const std::vector<HalfEdge>& sides);
+
 /// Compressed rows: items of row r are item[begin[r]] ... item[begin[r + 1] - 1].
 struct Adjacency {
   std::vector<int> begin;

@@ -27,13 +27,14 @@ struct FileLayout {
     std::string name;
     int first_polygon = 0;
   };
-  int num_vertices = 0;               ///< vertices in the file, unused ones included
-  std::vector<int> polygon_begin;     ///< offsets into polygon_vertex, one more than polygons
-  std::vector<int> polygon_vertex;    ///< file vertex per polygon corner
-  std::vector<int> polygon_uv;        ///< index into uv per polygon corner, -1 none; may be empty
-  std::vector<Vec2> uv;               ///< texture coordinates as the file lists them
-  std::vector<Group> groups;          ///< in file order
-  /// Positions of file vertices that are not in the simulation mesh (unused ones), else empty.
+  int num_vertices = 0;             ///< vertices in the file, unused ones included
+  std::vector<int> polygon_begin;   ///< offsets into polygon_vertex, one more than polygons
+  std::vector<int> polygon_vertex;  ///< file vertex per polygon corner
+  std::vector<int> polygon_uv;      ///< index into uv per polygon corner, -1 none; may be empty
+  std::vector<Vec2> uv;             ///< texture coordinates as the file lists them
+  std::vector<Group> groups;        ///< in file order
+  /// Positions [m] of the file vertices that are not in the simulation mesh (vertex_map is -1), one
+  /// row each in file order; empty if there are none.
   Positions positions;
 };
 
