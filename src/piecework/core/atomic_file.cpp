@@ -91,13 +91,15 @@ std::string read_file(const std::filesystem::path& path, std::size_t max_bytes) 
   if (std::filesystem::is_directory(status))
     throw InputError(fmt::format("{}: is a folder; name a file", path.string()));
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
+  if (!stream)
+    throw InputError(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
   std::string content;
   char buffer[1 << 16];
   while (stream.read(buffer, sizeof buffer) || stream.gcount() > 0) {
     content.append(buffer, static_cast<std::size_t>(stream.gcount()));
     if (content.size() > max_bytes)
-      throw InputError(fmt::format("{}: larger than the limit of {} bytes", path.string(), max_bytes));
+      throw InputError(
+          fmt::format("{}: larger than the limit of {} bytes", path.string(), max_bytes));
   }
   return content;
 }
@@ -105,7 +107,9 @@ std::string read_file(const std::filesystem::path& path, std::size_t max_bytes) 
 void create_directories(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error) throw OutputError(fmt::format("{}: cannot create the folder: {}", path.string(), error.message()));
+  if (error)
+    throw OutputError(
+        fmt::format("{}: cannot create the folder: {}", path.string(), error.message()));
 }
 
 }  // namespace piecework

@@ -15,7 +15,8 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
 
 /// Reads a whole file.
 /// \throws InputError if it is missing, a folder, unreadable, or larger than `max_bytes`.
-std::string read_file(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{1} << 33);
+std::string read_file(const std::filesystem::path& path,
+                      std::size_t max_bytes = std::size_t{1} << 33);
 
 /// Creates a folder and its parents. \throws OutputError with path and reason.
 void create_directories(const std::filesystem::path& path);

@@ -60,11 +60,11 @@ class BackendError : public Error {
 #ifdef PIECEWORK_ASSERTIONS
 #include <cstdio>
 #include <cstdlib>
-#define PIECEWORK_ASSERT(condition)                                                            \
-  ((condition) ? void(0)                                                                       \
-               : (std::fprintf(stderr, "%s:%d: assertion failed: %s\n", __FILE__, __LINE__,    \
-                               #condition),                                                    \
-                  std::abort()))
+#define PIECEWORK_ASSERT(condition)                                                              \
+  ((condition)                                                                                   \
+       ? void(0)                                                                                 \
+       : (std::fprintf(stderr, "%s:%d: assertion failed: %s\n", __FILE__, __LINE__, #condition), \
+          std::abort()))
 #else
 #define PIECEWORK_ASSERT(condition) void(0)
 #endif

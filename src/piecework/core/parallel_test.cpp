@@ -16,7 +16,8 @@ namespace {
 std::vector<double> random_terms(std::size_t count) {
   Random random(3);
   std::vector<double> terms(count);
-  for (double& term : terms) term = random.uniform(-1.0, 1.0) * std::pow(10.0, random.uniform(-8, 8));
+  for (double& term : terms)
+    term = random.uniform(-1.0, 1.0) * std::pow(10.0, random.uniform(-8, 8));
   return terms;
 }
 
@@ -24,8 +25,9 @@ std::vector<double> random_terms(std::size_t count) {
 TEST(Parallel, SumHasTheSameBitsForEveryThreadCount) {
   const std::vector<double> terms = random_terms(100'000);
   const auto sum_on = [&](int threads) {
-    return ThreadPool(threads).run(
-        [&] { return parallel_sum<double>(terms.size(), [&](std::size_t i) { return terms[i]; }); });
+    return ThreadPool(threads).run([&] {
+      return parallel_sum<double>(terms.size(), [&](std::size_t i) { return terms[i]; });
+    });
   };
   double forward = 0;
   for (double term : terms) forward += term;
@@ -37,7 +39,10 @@ TEST(Parallel, SumHasTheSameBitsForEveryThreadCount) {
 
 TEST(Parallel, ForVisitsEveryItemOnce) {
   std::vector<std::atomic<int>> visits(5000);
-  ThreadPool(4).run([&] { parallel_for(visits.size(), [&](std::size_t i) { ++visits[i]; }, 7); });
+  ThreadPool(4).run([&] {
+    parallel_for(
+        visits.size(), [&](std::size_t i) { ++visits[i]; }, 7);
+  });
   for (const auto& visit : visits) EXPECT_EQ(visit, 1);
 }
 
@@ -50,7 +55,8 @@ TEST(Parallel, EmptyRangesAreFine) {
 TEST(Parallel, MaximumDoesNotHideNan) {
   std::vector<double> values(2000, 1.0);
   values[1234] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(std::isnan(parallel_max(values.size(), [&](std::size_t i) { return values[i]; }, 16)));
+  EXPECT_TRUE(std::isnan(parallel_max(
+      values.size(), [&](std::size_t i) { return values[i]; }, 16)));
 }
 
 TEST(ThreadPool, MayHaveMoreThreadsThanCores) {

@@ -1,0 +1,59 @@
+#pragma once
+
+// Vanilla projective dynamics [Bouaziz et al. 2014]: Jacobi local step, undivided prefactored
+// global step. The baseline kept for ever; it shares nothing of the solver it is compared with.
+
+#include <deque>
+
+#include <piecework/global/cholmod_solver.hpp>
+#include <piecework/local/jacobi.hpp>
+#include <piecework/model/assembly.hpp>
+#include <piecework/model/stepper.hpp>
+
+namespace piecework::baselines {
+
+/// L-G iteration in increment form: K dx = -grad E(x), x += dx. Monotone in E.
+class VanillaPd final : public model::Minimizer {
+ public:
+  /// \param model    must outlive this object
+  /// \param h        time step, s
+  /// \param gravity  magnitude that turns forces into weights for `gradient`, m/s^2
+  VanillaPd(const model::ClothModel& model, double h, double gravity, model::StopOptions stop);
+
+  model::StepReport minimize(const model::StepProblem& problem, Positions& x) override;
+  [[nodiscard]] std::string description() const override;
+
+  /// Sizes and times of the last factorisation.
+  [[nodiscard]] const global::FactorReport& factor_report() const { return solver_.report(); }
+
+ private:
+  /// Estimates the remaining error from the decay of the increments (docs/architecture.md, D9).
+  class ErrorEstimate {
+   public:
+    void add(double dx_inf);
+    [[nodiscard]] double value() const;
+
+   private:
+    double last_ = 0;
+    std::deque<double> ratios_;
+  };
+
+  void factor(const std::vector<char>& fixed);
+  void global_step(Positions& x, model::StepReport& report);
+  [[nodiscard]] double relative_gradient() const;
+  [[nodiscard]] bool converged(const model::StepReport& report) const;
+
+  const model::ClothModel& model_;
+  model::StopOptions stop_;
+  double gravity_;
+  double unit_box_;  ///< largest extent of the start shape, m
+  SparseMatrix K_;
+  std::vector<char> fixed_;
+  model::FreeVertices free_;
+  global::CholmodSolver solver_;
+  local::JacobiStep local_;
+  Positions gradient_;
+  global::RightHandSides increment_;
+};
+
+}  // namespace piecework::baselines

@@ -1,0 +1,132 @@
+#include "bisection.hpp"
+
+#include <metis.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include <piecework/core/error.hpp>
+
+namespace piecework::decomposition {
+namespace {
+
+/// Below this size METIS coarsening has nothing to work with, and growing is as good.
+constexpr std::size_t kSmallSet = 24;
+
+static_assert(sizeof(idx_t) == sizeof(std::int32_t), "METIS must be built with 32-bit indices");
+
+}  // namespace
+
+Bisector::Bisector(const TriangleGraph& graph, int seed)
+    : graph_(graph), seed_(seed), local_(graph.neighbors.size(), -1) {}
+
+void Bisector::extract(std::span<const int> set) {
+  for (std::size_t i = 0; i < set.size(); ++i)
+    local_[static_cast<std::size_t>(set[i])] = static_cast<int>(i);
+  begin_.assign(1, 0);
+  neighbor_.clear();
+  weight_.clear();
+  for (const int triangle : set) {
+    for (const int other : graph_.neighbors[static_cast<std::size_t>(triangle)])
+      if (other >= 0 && local_[static_cast<std::size_t>(other)] >= 0)
+        neighbor_.push_back(local_[static_cast<std::size_t>(other)]);
+    begin_.push_back(static_cast<std::int32_t>(neighbor_.size()));
+    weight_.push_back(graph_.weight[static_cast<std::size_t>(triangle)]);
+  }
+  for (const int triangle : set) local_[static_cast<std::size_t>(triangle)] = -1;
+}
+
+bool Bisector::split_with_metis(double share) {
+  idx_t options[METIS_NOPTIONS];
+  METIS_SetDefaultOptions(options);
+  options[METIS_OPTION_SEED] = seed_;
+  idx_t count = static_cast<idx_t>(weight_.size());
+  idx_t constraints = 1;
+  idx_t parts = 2;
+  idx_t cut = 0;
+  real_t shares[2] = {static_cast<real_t>(share), static_cast<real_t>(1.0 - share)};
+  side_.assign(weight_.size(), 0);
+  const int status = METIS_PartGraphRecursive(&count, &constraints, begin_.data(), neighbor_.data(),
+                                              weight_.data(), nullptr, nullptr, &parts, shares,
+                                              nullptr, options, &cut, side_.data());
+  const auto second = std::count(side_.begin(), side_.end(), 1);
+  return status == METIS_OK && second > 0 && second < static_cast<std::ptrdiff_t>(side_.size());
+}
+
+/// Breadth-first from a triangle far from the middle until the share is reached.
+void Bisector::split_by_growing(double share) {
+  const auto breadth_first = [&](int start) {
+    visited_.assign(weight_.size(), 0);
+    queue_.assign(1, start);
+    visited_[static_cast<std::size_t>(start)] = 1;
+    for (std::size_t head = 0; head < queue_.size(); ++head)
+      for (auto k = begin_[static_cast<std::size_t>(queue_[head])];
+           k < begin_[static_cast<std::size_t>(queue_[head]) + 1]; ++k) {
+        const int next = neighbor_[static_cast<std::size_t>(k)];
+        if (visited_[static_cast<std::size_t>(next)]) continue;
+        visited_[static_cast<std::size_t>(next)] = 1;
+        queue_.push_back(next);
+      }
+  };
+  breadth_first(0);
+  breadth_first(queue_.back());
+  const double target = share * std::accumulate(weight_.begin(), weight_.end(), 0.0);
+  side_.assign(weight_.size(), 1);
+  double grown = 0;
+  for (std::size_t i = 0; i + 1 < queue_.size() && (i == 0 || grown < target); ++i) {
+    side_[static_cast<std::size_t>(queue_[i])] = 0;
+    grown += weight_[static_cast<std::size_t>(queue_[i])];
+  }
+}
+
+/// Leaves only the heaviest connected part of `side` on it. The others go to the other side, to
+/// which each of them is adjacent because the whole set is connected.
+void Bisector::keep_largest_part(int side) {
+  visited_.assign(weight_.size(), -1);
+  std::vector<double> part_weight;
+  for (std::size_t start = 0; start < weight_.size(); ++start) {
+    if (side_[start] != side || visited_[start] >= 0) continue;
+    const int part = static_cast<int>(part_weight.size());
+    part_weight.push_back(0);
+    queue_.assign(1, static_cast<int>(start));
+    visited_[start] = part;
+    while (!queue_.empty()) {
+      const auto current = static_cast<std::size_t>(queue_.back());
+      queue_.pop_back();
+      part_weight.back() += weight_[current];
+      for (auto k = begin_[current]; k < begin_[current + 1]; ++k) {
+        const auto next = static_cast<std::size_t>(neighbor_[static_cast<std::size_t>(k)]);
+        if (side_[next] != side || visited_[next] >= 0) continue;
+        visited_[next] = part;
+        queue_.push_back(static_cast<int>(next));
+      }
+    }
+  }
+  if (part_weight.size() < 2) return;
+  const auto largest = static_cast<int>(std::max_element(part_weight.begin(), part_weight.end()) -
+                                        part_weight.begin());
+  for (std::size_t i = 0; i < weight_.size(); ++i)
+    if (side_[i] == side && visited_[i] != largest) side_[i] = 1 - side;
+}
+
+std::size_t Bisector::split(std::span<int> set, double share) {
+  PIECEWORK_ASSERT(set.size() >= 2);
+  extract(set);
+  if (set.size() < kSmallSet || !split_with_metis(share)) split_by_growing(share);
+  // METIS may return parts in several pieces. After the second call both sides are connected: the
+  // second side's pieces are adjacent to the first side, which thereby stays connected.
+  keep_largest_part(0);
+  keep_largest_part(1);
+  std::vector<int> second;
+  std::size_t first_size = 0;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (side_[i] == 0)
+      set[first_size++] = set[i];
+    else
+      second.push_back(set[i]);
+  }
+  std::copy(second.begin(), second.end(), set.begin() + static_cast<std::ptrdiff_t>(first_size));
+  return first_size;
+}
+
+}  // namespace piecework::decomposition

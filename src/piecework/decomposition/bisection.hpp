@@ -1,0 +1,43 @@
+#pragma once
+
+// Connected two-way splits of sets of triangles. Private to the decomposition module.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace piecework::decomposition {
+
+/// Triangles as a graph: edge neighbours (-1 where there is none) and integer weights.
+struct TriangleGraph {
+  std::vector<std::array<int, 3>> neighbors;
+  std::vector<std::int32_t> weight;
+};
+
+/// Splits connected sets of triangles into two connected parts, reusing its buffers.
+class Bisector {
+ public:
+  Bisector(const TriangleGraph& graph, int seed);
+
+  /// Reorders `set` so that its first part comes first, and returns the size of that part
+  /// (at least 1, at most set.size() - 1). Both parts are connected; the first one's share of the
+  /// weight is close to `share`.
+  /// \pre set.size() >= 2 and its triangles are connected through the graph.
+  std::size_t split(std::span<int> set, double share);
+
+ private:
+  void extract(std::span<const int> set);
+  bool split_with_metis(double share);
+  void split_by_growing(double share);
+  void keep_largest_part(int side);
+
+  const TriangleGraph& graph_;
+  int seed_;
+  std::vector<int> local_;  ///< global triangle -> index in the current set, -1 outside
+  // The current set as a compressed graph.
+  std::vector<std::int32_t> begin_, neighbor_, weight_, side_;
+  std::vector<int> visited_, queue_;
+};
+
+}  // namespace piecework::decomposition

@@ -1,0 +1,243 @@
+#include <piecework/decomposition/decomposition.hpp>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include <piecework/core/error.hpp>
+#include <piecework/core/parallel.hpp>
+#include <piecework/testing/small_cloths.hpp>
+
+namespace piecework::decomposition {
+namespace {
+
+struct Case {
+  explicit Case(mesh::TriangleMesh m)
+      : mesh(std::move(m)),
+        hinges(mesh::find_hinges(mesh.triangles, mesh::find_edges(mesh.triangles))) {}
+  [[nodiscard]] Elements elements() const {
+    return {mesh.triangles, hinges, {}, mesh.num_vertices()};
+  }
+  [[nodiscard]] Decomposition decompose(int domains) const {
+    return decomposition::decompose(elements(), {.domains = domains});
+  }
+  mesh::TriangleMesh mesh;
+  std::vector<mesh::Hinge> hinges;
+};
+
+/// Brute force: is the set of triangles of `domain` connected through shared edges?
+bool connected(const Case& c, const Decomposition& d, int domain) {
+  std::vector<int> root(c.mesh.triangles.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int t) {
+    while (root[static_cast<std::size_t>(t)] != t) t = root[static_cast<std::size_t>(t)];
+    return t;
+  };
+  for (const mesh::Hinge& h : c.hinges)
+    if (d.triangle_domain[static_cast<std::size_t>(h.triangles[0])] == domain &&
+        d.triangle_domain[static_cast<std::size_t>(h.triangles[1])] == domain)
+      root[static_cast<std::size_t>(find(h.triangles[0]))] = find(h.triangles[1]);
+  std::set<int> roots;
+  for (std::size_t t = 0; t < root.size(); ++t)
+    if (d.triangle_domain[t] == domain) roots.insert(find(static_cast<int>(t)));
+  return roots.size() == 1;
+}
+
+/// Brute force: the domains of each vertex, from the constraints.
+std::vector<std::set<int>> domains_of_vertices(const Case& c, const Decomposition& d) {
+  std::vector<std::set<int>> sets(static_cast<std::size_t>(c.mesh.num_vertices()));
+  for (std::size_t t = 0; t < c.mesh.triangles.size(); ++t)
+    for (const int v : c.mesh.triangles[t])
+      sets[static_cast<std::size_t>(v)].insert(d.triangle_domain[t]);
+  for (std::size_t h = 0; h < c.hinges.size(); ++h)
+    for (const int v : c.hinges[h].vertices)
+      sets[static_cast<std::size_t>(v)].insert(d.hinge_domain[h]);
+  return sets;
+}
+
+bool is_ancestor_or_self(const Decomposition& d, int ancestor, int node) {
+  for (; node >= 0; node = d.nodes[static_cast<std::size_t>(node)].parent)
+    if (node == ancestor) return true;
+  return false;
+}
+
+int leaf_of(const Decomposition& d, int domain) {
+  for (std::size_t n = 0; n < d.nodes.size(); ++n)
+    if (d.nodes[n].is_leaf() && d.nodes[n].first_domain == domain) return static_cast<int>(n);
+  return -1;
+}
+
+void expect_sound(const Case& c, const Decomposition& d) {
+  std::vector<int> size(static_cast<std::size_t>(d.num_domains), 0);
+  for (const int domain : d.triangle_domain) {
+    ASSERT_GE(domain, 0);
+    ASSERT_LT(domain, d.num_domains);
+    ++size[static_cast<std::size_t>(domain)];
+  }
+  for (const int s : size) EXPECT_GT(s, 0) << "empty domain";
+  const auto sets = domains_of_vertices(c, d);
+  for (int v = 0; v < c.mesh.num_vertices(); ++v) {
+    const auto first =
+        d.vertex_domains.item.begin() + d.vertex_domains.begin[static_cast<std::size_t>(v)];
+    const auto last =
+        d.vertex_domains.item.begin() + d.vertex_domains.begin[static_cast<std::size_t>(v) + 1];
+    EXPECT_TRUE(std::equal(first, last, sets[static_cast<std::size_t>(v)].begin(),
+                           sets[static_cast<std::size_t>(v)].end()));
+  }
+  // The elimination-tree property: a constraint's vertices lie on its leaf's path to the root.
+  for (std::size_t h = 0; h < c.hinges.size(); ++h)
+    for (const int v : c.hinges[h].vertices)
+      ASSERT_TRUE(is_ancestor_or_self(d, d.vertex_node[static_cast<std::size_t>(v)],
+                                      leaf_of(d, d.hinge_domain[h])));
+  for (std::size_t t = 0; t < c.mesh.triangles.size(); ++t)
+    for (const int v : c.mesh.triangles[t])
+      ASSERT_TRUE(is_ancestor_or_self(d, d.vertex_node[static_cast<std::size_t>(v)],
+                                      leaf_of(d, d.triangle_domain[t])));
+}
+
+TEST(Decomposition, GridsAreConnectedBalancedAndSound) {
+  const Case grid(testing::grid_mesh(41, 41));
+  for (const int domains : {2, 3, 7, 16, 32, 64}) {
+    SCOPED_TRACE(domains);
+    const Decomposition d = grid.decompose(domains);
+    ASSERT_EQ(d.num_domains, domains);
+    expect_sound(grid, d);
+    for (int k = 0; k < domains; ++k) EXPECT_TRUE(connected(grid, d, k)) << k;
+    const Summary s = summarize(d, grid.elements());
+    EXPECT_LT(s.balance, 1.25);
+    EXPECT_GT(s.boundary, s.corner);
+    EXPECT_EQ(s.remainder + s.corner, 41 * 41);
+    EXPECT_GT(s.edge_cut, 0);
+  }
+}
+
+TEST(Decomposition, OneDomainIsTheWholeMeshWithoutMetis) {
+  const Case grid(testing::grid_mesh(5, 5));
+  const Decomposition d = grid.decompose(1);
+  EXPECT_EQ(d.num_domains, 1);
+  EXPECT_EQ(d.nodes.size(), 1U);
+  const Summary s = summarize(d, grid.elements());
+  EXPECT_EQ(s.corner, 0);
+  EXPECT_EQ(s.boundary, 0);
+  EXPECT_EQ(s.remainder, 25);
+  EXPECT_EQ(s.edge_cut, 0);
+  EXPECT_EQ(s.balance, 1.0);
+}
+
+TEST(Decomposition, AsManyDomainsAsTrianglesAndMore) {
+  const Case grid(testing::grid_mesh(4, 4));  // 18 triangles
+  const Decomposition d = grid.decompose(18);
+  EXPECT_EQ(d.num_domains, 18);
+  EXPECT_TRUE(d.notes.empty());
+  expect_sound(grid, d);
+  const Decomposition reduced = grid.decompose(1000);
+  EXPECT_EQ(reduced.num_domains, 18);
+  ASSERT_EQ(reduced.notes.size(), 1U);
+  EXPECT_NE(reduced.notes[0].find("1000"), std::string::npos);
+  EXPECT_EQ(reduced.triangle_domain, d.triangle_domain);
+}
+
+TEST(Decomposition, EveryCountFromOneToTheNumberOfTriangles) {
+  const Case grid(testing::grid_mesh(6, 5));  // 40 triangles
+  for (int domains = 1; domains <= 40; ++domains) {
+    SCOPED_TRACE(domains);
+    const Decomposition d = grid.decompose(domains);
+    ASSERT_EQ(d.num_domains, domains);
+    expect_sound(grid, d);
+  }
+}
+
+TEST(Decomposition, SingleTriangle) {
+  mesh::TriangleMesh one;
+  one.positions = testing::random_positions(3, 1, 1);
+  one.triangles = {{0, 1, 2}};
+  const Decomposition d = Case(one).decompose(8);
+  EXPECT_EQ(d.num_domains, 1);
+  EXPECT_EQ(d.notes.size(), 1U);
+}
+
+TEST(Decomposition, ClosedMeshWithTwoDomainsHasNoCorner) {
+  const Case sphere(testing::sphere_mesh(3));
+  const Decomposition d = sphere.decompose(2);
+  expect_sound(sphere, d);
+  const Summary s = summarize(d, sphere.elements());
+  EXPECT_EQ(s.corner, 0);
+  EXPECT_GT(s.boundary, 0);
+}
+
+TEST(Decomposition, ComponentsAreSplitBeforeBisection) {
+  const Case two(testing::disjoint_union(testing::grid_mesh(21, 21), testing::grid_mesh(11, 11)));
+  const Decomposition d = two.decompose(5);
+  expect_sound(two, d);
+  for (int k = 0; k < 5; ++k) EXPECT_TRUE(connected(two, d, k));
+  // 800 and 200 triangles: four domains and one.
+  std::set<int> of_large;
+  for (int t = 0; t < 800; ++t) of_large.insert(d.triangle_domain[static_cast<std::size_t>(t)]);
+  EXPECT_EQ(of_large.size(), 4U);
+  // The root joins the two components and owns no separator.
+  EXPECT_EQ(std::count(d.vertex_node.begin(), d.vertex_node.end(), 0), 0);
+}
+
+TEST(Decomposition, MoreComponentsThanDomainsArePacked) {
+  mesh::TriangleMesh pieces = testing::grid_mesh(5, 5);
+  for (int i = 0; i < 4; ++i) pieces = testing::disjoint_union(pieces, testing::grid_mesh(5, 5));
+  const Case five(pieces);
+  const Decomposition d = five.decompose(2);
+  EXPECT_EQ(d.num_domains, 2);
+  EXPECT_EQ(d.notes.size(), 1U);
+  expect_sound(five, d);
+  EXPECT_EQ(summarize(d, five.elements()).boundary, 0);
+}
+
+TEST(Decomposition, IsAFunctionOfItsInputOnly) {
+  const Case grid(testing::grid_mesh(41, 33));
+  const Decomposition expected = ThreadPool(1).run([&] { return grid.decompose(24); });
+  for (const int threads : {2, 3, 8}) {
+    const Decomposition d = ThreadPool(threads).run([&] { return grid.decompose(24); });
+    EXPECT_EQ(d.triangle_domain, expected.triangle_domain);
+    EXPECT_EQ(d.vertex_node, expected.vertex_node);
+    EXPECT_EQ(d.vertex_domains.item, expected.vertex_domains.item);
+  }
+}
+
+TEST(Decomposition, WithoutBendingTheInterfaceIsOneVertexWide) {
+  const Case grid(testing::grid_mesh(31, 31));
+  std::vector<std::uint8_t> none(grid.hinges.size(), 0);
+  Elements membrane = grid.elements();
+  membrane.hinge_bends = none;
+  const Summary thin = summarize(decompose(membrane, {.domains = 2}), membrane);
+  const Summary wide = summarize(grid.decompose(2), grid.elements());
+  EXPECT_GE(thin.boundary, 31);
+  EXPECT_LE(thin.boundary, 45);
+  EXPECT_GT(wide.boundary, thin.boundary);
+}
+
+TEST(Decomposition, AdjacentDomainsMatchBruteForce) {
+  const Case grid(testing::grid_mesh(21, 21));
+  const Decomposition d = grid.decompose(9);
+  std::set<std::array<int, 2>> expected;
+  for (std::size_t a = 0; a < grid.mesh.triangles.size(); ++a)
+    for (std::size_t b = 0; b < grid.mesh.triangles.size(); ++b) {
+      const auto& ta = grid.mesh.triangles[a];
+      int shared = 0;
+      for (const int v : grid.mesh.triangles[b]) shared += std::count(ta.begin(), ta.end(), v) > 0;
+      if (shared == 2 && d.triangle_domain[a] < d.triangle_domain[b])
+        expected.insert({d.triangle_domain[a], d.triangle_domain[b]});
+    }
+  const auto pairs = adjacent_domains(d, grid.hinges);
+  EXPECT_EQ(std::set(pairs.begin(), pairs.end()), expected);
+  EXPECT_GT(pairs.size(), 8U);
+}
+
+TEST(Decomposition, RefusesNonsense) {
+  const Case grid(testing::grid_mesh(3, 3));
+  EXPECT_THROW(grid.decompose(0), InputError);
+  EXPECT_THROW(grid.decompose(-4), InputError);
+  EXPECT_THROW(decompose({{}, {}, {}, 0}, {.domains = 1}), InputError);
+}
+
+}  // namespace
+}  // namespace piecework::decomposition

@@ -1,0 +1,154 @@
+#include <piecework/global/cholmod_solver.hpp>
+
+#include <cholmod.h>
+
+#include <fmt/format.h>
+
+#include <piecework/core/clock.hpp>
+#include <piecework/core/error.hpp>
+
+extern "C" void openblas_set_num_threads(int threads);
+
+namespace piecework::global {
+namespace {
+
+SolveStatus to_status(int status) {
+  switch (status) {
+    case CHOLMOD_OK:
+    case CHOLMOD_DSMALL:
+      return SolveStatus::Ok;
+    case CHOLMOD_OUT_OF_MEMORY:
+    case CHOLMOD_TOO_LARGE:
+      return SolveStatus::OutOfMemory;
+    default:
+      return SolveStatus::NotPositiveDefinite;
+  }
+}
+
+/// A view of K's lower triangle for CHOLMOD; nothing is copied.
+cholmod_sparse view(const SparseMatrix& K) {
+  cholmod_sparse view{};
+  view.nrow = static_cast<std::size_t>(K.rows());
+  view.ncol = static_cast<std::size_t>(K.cols());
+  view.nzmax = static_cast<std::size_t>(K.nonZeros());
+  view.p = const_cast<int*>(K.outerIndexPtr());  // NOLINT: CHOLMOD's C interface is not const
+  view.i = const_cast<int*>(K.innerIndexPtr());  // NOLINT
+  view.x = const_cast<double*>(K.valuePtr());    // NOLINT
+  view.stype = -1;
+  view.itype = CHOLMOD_INT;
+  view.xtype = CHOLMOD_REAL;
+  view.dtype = CHOLMOD_DOUBLE;
+  view.sorted = 1;
+  view.packed = 1;
+  return view;
+}
+
+}  // namespace
+
+struct CholmodSolver::Impl {
+  Impl() {
+    openblas_set_num_threads(1);
+    cholmod_start(&common);
+    common.print = 0;
+    common.supernodal = CHOLMOD_SUPERNODAL;
+    common.nmethods = 1;
+    common.method[0].ordering = CHOLMOD_METIS;
+    common.postorder = 1;
+  }
+  ~Impl() {
+    cholmod_free_factor(&factor, &common);
+    cholmod_free_dense(&x, &common);
+    cholmod_free_dense(&y, &common);
+    cholmod_free_dense(&e, &common);
+    cholmod_finish(&common);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  SolveStatus factorize(const SparseMatrix& K) {
+    Stopwatch watch;
+    cholmod_sparse matrix = view(K);
+    const int ok = cholmod_factorize(&matrix, factor, &common);
+    SolveStatus status = to_status(common.status);
+    if (!ok && status == SolveStatus::Ok) status = SolveStatus::NotPositiveDefinite;
+    report.factor_ms = watch.elapsed_ms();
+    report.reciprocal_condition = factor ? cholmod_rcond(factor, &common) : 0;
+    // BLAS lets NaN pass through a pivot; rcond looks at every one of them.
+    if (status == SolveStatus::Ok && !(report.reciprocal_condition > 0))
+      status = SolveStatus::NotPositiveDefinite;
+    report.nonzeros = common.lnz;
+    report.flops = common.fl;
+    report.bytes = (factor && factor->is_super) ? factor->xsize * sizeof(double) : 0;
+    factored = status == SolveStatus::Ok;
+    return status;
+  }
+
+  cholmod_common common{};
+  cholmod_factor* factor = nullptr;
+  cholmod_dense* x = nullptr;  ///< workspaces that cholmod_solve2 keeps from call to call
+  cholmod_dense* y = nullptr;
+  cholmod_dense* e = nullptr;
+  bool factored = false;
+  Eigen::Index rows = 0;
+  FactorReport report;
+};
+
+CholmodSolver::CholmodSolver() : impl_(std::make_unique<Impl>()) {}
+CholmodSolver::~CholmodSolver() = default;
+CholmodSolver::CholmodSolver(CholmodSolver&&) noexcept = default;
+CholmodSolver& CholmodSolver::operator=(CholmodSolver&&) noexcept = default;
+
+SolveStatus CholmodSolver::factor(const SparseMatrix& K) {
+  cholmod_free_factor(&impl_->factor, &impl_->common);
+  impl_->factored = false;
+  impl_->report = {};
+  impl_->rows = K.rows();
+  if (K.rows() == 0) {
+    impl_->factored = true;
+    return SolveStatus::Ok;
+  }
+  Stopwatch watch;
+  cholmod_sparse matrix = view(K);
+  impl_->factor = cholmod_analyze(&matrix, &impl_->common);
+  impl_->report.analyze_ms = watch.elapsed_ms();
+  if (!impl_->factor) return to_status(impl_->common.status);
+  return impl_->factorize(K);
+}
+
+SolveStatus CholmodSolver::refactor(const SparseMatrix& K) {
+  if (K.rows() == 0 && impl_->rows == 0) return SolveStatus::Ok;
+  if (!impl_->factor) return SolveStatus::NotFactored;
+  PIECEWORK_ASSERT(K.rows() == impl_->rows);
+  impl_->report.analyze_ms = 0;
+  return impl_->factorize(K);
+}
+
+SolveStatus CholmodSolver::solve(RightHandSides& b) {
+  if (!impl_->factored) return SolveStatus::NotFactored;
+  PIECEWORK_ASSERT(b.rows() == impl_->rows);
+  if (b.rows() == 0) return SolveStatus::Ok;
+  cholmod_dense rhs{};
+  rhs.nrow = static_cast<std::size_t>(b.rows());
+  rhs.ncol = 3;
+  rhs.nzmax = 3 * rhs.nrow;
+  rhs.d = rhs.nrow;
+  rhs.x = b.data();
+  rhs.xtype = CHOLMOD_REAL;
+  rhs.dtype = CHOLMOD_DOUBLE;
+  if (!cholmod_solve2(CHOLMOD_A, impl_->factor, &rhs, nullptr, &impl_->x, nullptr, &impl_->y,
+                      &impl_->e, &impl_->common))
+    return to_status(impl_->common.status);
+  b = Eigen::Map<const RightHandSides>(static_cast<const double*>(impl_->x->x), b.rows(), 3);
+  return SolveStatus::Ok;
+}
+
+const FactorReport& CholmodSolver::report() const { return impl_->report; }
+
+std::string CholmodSolver::description() {
+  int version[3];
+  cholmod_version(version);
+  return fmt::format("CHOLMOD {}.{}.{} supernodal, METIS, OpenBLAS 1 thread", version[0],
+                     version[1], version[2]);
+}
+
+}  // namespace piecework::global

@@ -1,0 +1,84 @@
+#include <piecework/global/cholmod_solver.hpp>
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+
+#include <piecework/model/assembly.hpp>
+#include <piecework/testing/small_cloths.hpp>
+
+namespace piecework::global {
+namespace {
+
+SparseMatrix cloth_matrix(int side, double h = 1.0 / 120.0) {
+  return model::assemble_system(
+      testing::cloth_model(testing::grid_mesh(side, side), testing::cotton(1e-3)), h);
+}
+
+TEST(CholmodSolver, MatchesADenseSolve) {
+  const SparseMatrix K = cloth_matrix(12);
+  RightHandSides b = testing::random_positions(144, 1, 7);
+  const Eigen::MatrixXd expected = Eigen::MatrixXd(K).fullPivLu().solve(Eigen::MatrixXd(b));
+  CholmodSolver solver;
+  ASSERT_EQ(solver.factor(K), SolveStatus::Ok);
+  ASSERT_EQ(solver.solve(b), SolveStatus::Ok);
+  EXPECT_LT((b - expected).norm() / expected.norm(), 1e-12);
+  EXPECT_GT(solver.report().nonzeros, 144);
+  EXPECT_GT(solver.report().bytes, 0U);
+  EXPECT_GT(solver.report().flops, 0);
+}
+
+TEST(CholmodSolver, RefactorsNewValuesOnTheSamePattern) {
+  CholmodSolver solver;
+  ASSERT_EQ(solver.factor(cloth_matrix(10)), SolveStatus::Ok);
+  const SparseMatrix stiffer = cloth_matrix(10, 1.0 / 30.0);
+  ASSERT_EQ(solver.refactor(stiffer), SolveStatus::Ok);
+  EXPECT_EQ(solver.report().analyze_ms, 0);
+  const RightHandSides b = testing::random_positions(100, 1, 8);
+  RightHandSides x = b;
+  ASSERT_EQ(solver.solve(x), SolveStatus::Ok);
+  EXPECT_LT((stiffer * x - b).norm(), 1e-10 * b.norm());
+}
+
+TEST(CholmodSolver, IndefiniteMatrixIsAStatusAndDropsTheFactor) {
+  CholmodSolver solver;
+  ASSERT_EQ(solver.factor(cloth_matrix(6)), SolveStatus::Ok);
+  SparseMatrix bad = cloth_matrix(6);
+  bad.coeffRef(7, 7) = -1;
+  EXPECT_EQ(solver.factor(bad), SolveStatus::NotPositiveDefinite);
+  RightHandSides b = RightHandSides::Constant(36, 3, 42);
+  EXPECT_EQ(solver.solve(b), SolveStatus::NotFactored);
+  EXPECT_TRUE(b == RightHandSides::Constant(36, 3, 42));
+}
+
+TEST(CholmodSolver, NanIsNotPositiveDefinite) {
+  SparseMatrix bad = cloth_matrix(6);
+  bad.coeffRef(7, 7) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(CholmodSolver().factor(bad), SolveStatus::NotPositiveDefinite);
+}
+
+TEST(CholmodSolver, BeforeTheFirstFactor) {
+  CholmodSolver solver;
+  RightHandSides b = RightHandSides::Ones(4, 3);
+  EXPECT_EQ(solver.solve(b), SolveStatus::NotFactored);
+  EXPECT_EQ(solver.refactor(cloth_matrix(4)), SolveStatus::NotFactored);
+}
+
+TEST(CholmodSolver, SizesZeroAndOne) {
+  CholmodSolver solver;
+  RightHandSides none(0, 3);
+  EXPECT_EQ(solver.factor(SparseMatrix(0, 0)), SolveStatus::Ok);
+  EXPECT_EQ(solver.solve(none), SolveStatus::Ok);
+  SparseMatrix one(1, 1);
+  one.insert(0, 0) = 4;
+  one.makeCompressed();
+  RightHandSides b = RightHandSides::Constant(1, 3, 8);
+  EXPECT_EQ(solver.factor(one), SolveStatus::Ok);
+  EXPECT_EQ(solver.solve(b), SolveStatus::Ok);
+  EXPECT_TRUE(b == RightHandSides::Constant(1, 3, 2));
+}
+
+}  // namespace
+}  // namespace piecework::global

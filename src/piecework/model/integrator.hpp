@@ -1,0 +1,47 @@
+#pragma once
+
+// Implicit Euler around any minimiser: prediction, pins, minimisation, velocities.
+
+#include <memory>
+#include <optional>
+
+#include <piecework/model/constraints.hpp>
+#include <piecework/model/forces.hpp>
+#include <piecework/model/pins.hpp>
+#include <piecework/model/stepper.hpp>
+
+namespace piecework::model {
+
+struct IntegratorOptions {
+  double h = 1.0 / 120.0;         ///< s
+  std::optional<double> damping;  ///< 1/s: velocities fall by exp(-damping h) per step; absent: off
+};
+
+/// Advances a State step by step:
+///     z = x_n + h v_n + h^2 M^-1 f_ext(x_n, v_n);  x_{n+1} = argmin E(x; z);
+///     v_{n+1} = (x_{n+1} - x_n) / h                                         [Lu25, Eq. 1]
+class Integrator {
+ public:
+  /// \param model  must outlive the integrator.
+  Integrator(const ClothModel& model, ExternalForces forces, std::vector<Pin> pins,
+             IntegratorOptions options, std::unique_ptr<Minimizer> minimizer);
+
+  /// One step. On an exception the state is as it was before.
+  /// \throws SimulationError if the new state is not finite (the text says what to change).
+  StepReport step(State& state);
+
+  /// The start of a simulation: start shape, pins placed, the velocity of each part.
+  [[nodiscard]] State initial_state(const std::vector<Vec3>& part_velocity) const;
+
+  [[nodiscard]] const Minimizer& minimizer() const { return *minimizer_; }
+
+ private:
+  const ClothModel& model_;
+  ForceField forces_;
+  PinScript pins_;
+  IntegratorOptions options_;
+  std::unique_ptr<Minimizer> minimizer_;
+  Positions acceleration_, predicted_, x_;
+};
+
+}  // namespace piecework::model

@@ -1,0 +1,73 @@
+#pragma once
+
+// What every time stepper shares: the state, the step's data and its report.
+
+#include <string>
+#include <vector>
+
+#include <piecework/core/types.hpp>
+
+namespace piecework::model {
+
+/// The whole dynamic state; with the scene it determines everything that follows.
+struct State {
+  Positions x;      ///< |V| x 3, m
+  Positions v;      ///< |V| x 3, m/s
+  double time = 0;  ///< s
+  int step = 0;     ///< steps done
+};
+
+/// When the iteration of a step stops. Units of the tolerance in scene::Quality and docs/scene.md.
+enum class StopRule { Error, Gradient, Dx2, DxRms, DxInf, Iterations };
+
+struct StopOptions {
+  StopRule rule = StopRule::Error;
+  double tolerance = 1e-2;
+  int max_iterations = 200;
+  int min_iterations = 1;
+};
+
+/// Milliseconds per phase of a step, columns of the paper's Table 1 as far as they apply.
+/// A phase that did not run is negative and printed as "-".
+struct PhaseTimes {
+  double local = -1;     ///< L: projections, gradient, energy
+  double global = -1;    ///< G: the global solve
+  double refactor = -1;  ///< Ref.: factorisation, in steps where pins were released
+  double misc = -1;      ///< Misc.: external forces, prediction, pins, velocities
+};
+
+/// What a step did, and how well.
+struct StepReport {
+  int iterations = 0;
+  bool converged = false;
+  double gradient = 0;  ///< rms nodal force residual over free vertices / mean nodal weight
+  double error = 0;     ///< estimated position error, in mean edge lengths
+  double energy = 0;    ///< incremental potential E(x), J
+  double dx_2 = 0, dx_rms = 0, dx_inf = 0;  ///< last increment in the unit box (the paper's rule)
+  int global_solves = 0;
+  int degenerate_projections = 0;  ///< triangles that needed the rank-deficient rule
+  PhaseTimes phases;
+  double step_ms = 0;
+};
+
+/// The minimisation problem of one implicit Euler step [Lu25, Eq. 1].
+struct StepProblem {
+  const Positions* predicted;      ///< z = x_n + h v_n + h^2 M^-1 f_ext, |V| x 3, m
+  const std::vector<char>* fixed;  ///< per vertex: held; x already holds the prescribed position
+  const Positions* previous;       ///< x_n; orients degenerate triangles
+};
+
+/// Minimises the incremental potential; one implementation per method.
+class Minimizer {
+ public:
+  virtual ~Minimizer() = default;
+
+  /// Improves x (in: start of the iteration, out: the step's end state).
+  /// \throws SimulationError if x becomes non-finite or K is not positive definite; x is then void.
+  virtual StepReport minimize(const StepProblem& problem, Positions& x) = 0;
+
+  /// One line for reports: libraries and orderings used.
+  [[nodiscard]] virtual std::string description() const = 0;
+};
+
+}  // namespace piecework::model
