@@ -131,8 +131,9 @@ void fail(const Document& document, const Place& place, const std::string& point
           const std::string& problem, const std::string& remedy) {
   std::string where = document.sources.at(place.source);
   if (place.line > 0) where += fmt::format(":{}:{}", place.line, place.column);
-  throw InputError(
-      fmt::format("{}: {}: {}; {}", where, pointer.empty() ? "/" : pointer, problem, remedy));
+  constexpr std::size_t kMaxPointer = 200;
+  const std::string what = pointer.empty() ? "/" : printable(pointer, kMaxPointer);
+  throw InputError(fmt::format("{}: {}: {}; {}", where, what, problem, remedy));
 }
 
 void fail(const Document& document, const std::string& pointer, const std::string& problem,
@@ -165,14 +166,13 @@ std::string pointer_step(std::string_view key) {
   return step;
 }
 
-std::string printable(std::string_view text) {
-  constexpr std::size_t kMax = 60;
+std::string printable(std::string_view text, std::size_t max_length) {
   std::string out;
   std::size_t characters = 0;
   for (char c : text) {
     const auto byte = static_cast<unsigned char>(c);
     const bool continuation = (byte & 0xC0U) == 0x80U;
-    if (!continuation && ++characters > kMax) return out + "...";
+    if (!continuation && ++characters > max_length) return out + "...";
     if (byte < 0x20 || byte == 0x7F)
       out += fmt::format("\\x{:02x}", byte);
     else

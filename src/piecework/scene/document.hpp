@@ -49,7 +49,7 @@ struct Document {
 /// Larger texts, deeper nesting and more values than this are refused.
 inline constexpr std::size_t kMaxTextBytes = std::size_t{64} << 20;
 inline constexpr std::size_t kMaxDepth = 64;
-inline constexpr std::size_t kMaxValues = 5'000'000;
+inline constexpr std::size_t kMaxValues = 2'000'000;
 
 /// Parses JSON with // and /* */ comments.
 /// \throws InputError with line, column and pointer: syntax errors, numbers
@@ -76,8 +76,8 @@ void apply_override(Document& document, const std::string& path, const std::stri
 /// One step of a JSON pointer: "/" and the key with ~ and / escaped.
 std::string pointer_step(std::string_view key);
 
-/// `text` fit for a message: control characters escaped, at most 60 characters.
-std::string printable(std::string_view text);
+/// `text` fit for a message: control characters escaped, at most `max_length` characters.
+std::string printable(std::string_view text, std::size_t max_length = 60);
 
 /// What a value is, for messages: "the number 3", "the text \"abc\"", "a list",
 /// ...

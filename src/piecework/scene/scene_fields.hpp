@@ -117,12 +117,17 @@ void fields(V& v, Material& m) {
 
 template <class V>
 void fields(V& v, Wind& w) {
-  v.about("Wind", "Moving air that drags the cloth along. Absent: no air at all.");
+  v.about("Wind",
+          "Moving air that drags the cloth along: per triangle of area A the force rho/2 A |u| "
+          "(C_n u_n + "
+          "C_t u_t), u the air's velocity relative to the cloth, u_n and u_t its parts normal and "
+          "tangential to the triangle. Absent: no air at all.");
   v.value({"velocity", "velocity of the air", "m/s"}, w.velocity, between(-1e3, 1e3));
-  v.value({"air_density", "mass per volume of the air", "kg/m^3"}, w.air_density, above(0, 1e4));
-  v.value({"normal_drag", "drag coefficient for flow through the cloth"}, w.normal_drag,
+  v.value({"air_density", "mass per volume rho of the air", "kg/m^3"}, w.air_density,
+          above(0, 1e4));
+  v.value({"normal_drag", "drag coefficient C_n for flow through the cloth"}, w.normal_drag,
           between(0, 1e3));
-  v.value({"tangential_drag", "drag coefficient for flow along the cloth"}, w.tangential_drag,
+  v.value({"tangential_drag", "drag coefficient C_t for flow along the cloth"}, w.tangential_drag,
           between(0, 1e3));
   v.value({"gust_amplitude",
            "strength a of gusts: at time t the air moves "
@@ -233,7 +238,7 @@ void fields(V& v, Mesh& m) {
              "preferred direction"}});
   v.value(Key{"jitter", "how far inner vertices of the delaunay pattern move, in cells"}.only(
               made, if_made),
-          m.jitter, between(0, 0.5));
+          m.jitter, between(0, 0.45));
   v.value(Key{"seed", "seed of the jitter"}.only(made, if_made), m.seed,
           between(0, std::numeric_limits<int>::max()));
   v.value(Key{"patches_x", "patches along the width (quilt)"}.only(made, if_made), m.patches_x,
@@ -417,8 +422,9 @@ void fields(V& v, Scene& s) {
   v.value(Key{"gravity", "acceleration of free fall; null: off", "m/s^2"}.on(), s.gravity,
           between(-1e6, 1e6));
   v.object({"wind", "moving air; absent: off"}, s.wind);
-  v.value({"damping", "rate at which velocities decay; absent: off", "1/s"}, s.damping,
-          above(0, 1e6));
+  v.value(
+      {"damping", "rate d at which velocities decay, by exp(-d h) per step; absent: off", "1/s"},
+      s.damping, above(0, 1e6));
   v.object({"solver", "how a step is solved"}, s.solver);
   v.object({"quality", "how accurately a step is solved"}, s.quality);
   v.map(Key{"materials", "materials by name; cloths share them"}.needed(), s.materials);
