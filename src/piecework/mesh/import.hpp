@@ -37,6 +37,16 @@ struct ImportOptions {
 ///         form one fan; inconsistent orientation; isolated vertices; more than max_triangles.
 MeshDocument import_mesh(const std::filesystem::path& path, const ImportOptions& options);
 
+/// Where the vertices of `mesh` are in `other`, a file with the same vertices and faces in another
+/// shape (the rest shape of a draped garment): one row per simulation vertex of `mesh`, m. Vertices
+/// are matched by their number in the files, so it does not matter that the two shapes may have cut
+/// their quads along different diagonals; use the triangles of `mesh` with the result.
+/// \param other_name  opens the messages
+/// \throws InputError if the files differ in the number of vertices or in their faces, or if
+///         vertices that were welded in `mesh` are apart in `other`.
+Positions corresponding_positions(const MeshDocument& mesh, const MeshDocument& other,
+                                  const std::string& other_name);
+
 /// The checks of import_mesh() on any mesh. `name` opens the message.
 /// \throws InputError as above.
 void validate(const TriangleMesh& mesh, const std::string& name);

@@ -400,6 +400,42 @@ TEST_F(Import, AFileThatCrashesAssimpIsAnError) {
   EXPECT_TRUE(contains(import_error(write("crash.ply", ply)), "crash.ply: "));
 }
 
+// --- corresponding_positions()
+// --------------------------------------------------------------------
+
+TEST_F(Import, RestShapesCorrespondByFileVertex) {
+  // The square is cut along its other diagonal once it is a kite; the split vertices go along.
+  const std::string faces = "f 1 2 3 4\nf 5 6 7\n";
+  const MeshDocument start =
+      import_mesh(write("start.obj", kSquare + "v 1 0 0\nv 2 0 0\nv 1 1 0\n" + faces), {});
+  const MeshDocument rest =
+      import_mesh(write("rest.obj",
+                        "v 0 0 0\nv 1 -1 0\nv 5 0 0\nv 1 1 0\nv 1 -1 0\nv 7 0 0\n"
+                        "v 5 0 0\n" +
+                            faces),
+                  {});
+  ASSERT_EQ(start.mesh.num_vertices(), 5);
+  ASSERT_NE(start.mesh.triangles, rest.mesh.triangles);
+  const Positions positions = corresponding_positions(start, rest, "rest.obj");
+  ASSERT_EQ(positions.rows(), 5);
+  EXPECT_EQ(positions.row(1), Eigen::RowVector3d(1, -1, 0));
+  EXPECT_EQ(positions.row(4), Eigen::RowVector3d(7, 0, 0));
+
+  const auto error_of = [&](const std::string& text) -> std::string {
+    try {
+      corresponding_positions(start, import_mesh(write("other.obj", text), {}), "other.obj");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_TRUE(contains(error_of(kSquare + kSquareFaces), "other.obj: 4 vertices, the mesh it"));
+  EXPECT_TRUE(contains(error_of(kSquare + "v 1 0 0\nv 2 0 0\nv 1 1 0\nf 1 2 3 4\nf 6 7 5\n"),
+                       "other faces"));
+  EXPECT_TRUE(contains(error_of(kSquare + "v 1 0.5 0\nv 2 0 0\nv 1 1 0\n" + faces),
+                       "vertices 1 and 4 are apart"));
+}
+
 // --- validate() ----------------------------------------------------------------------------------
 
 TEST(Validate, AcceptsGeneratedMeshesAndRefusesBrokenOnes) {
