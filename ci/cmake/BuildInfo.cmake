@@ -23,7 +23,7 @@ if(CMAKE_SCRIPT_MODE_FILE)
   return()
 endif()
 
-include_guard()
+include_guard(GLOBAL)
 
 string(TOUPPER "${CMAKE_BUILD_TYPE}" _config)
 string(STRIP "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${_config}} -ffp-contract=off" _flags)
