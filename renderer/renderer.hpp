@@ -3,6 +3,7 @@
 // Offscreen pictures of triangle meshes. Knows no solver: it takes positions, triangles and
 // colours in memory and gives back pixels.
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -25,12 +26,12 @@ enum class DofClass : std::uint8_t { Internal, Duplicate, Corner };
 
 /// Everything to draw; spans must outlive the call to draw().
 struct Frame {
-  const Positions* positions = nullptr;         ///< |V| x 3, m
+  const Positions* positions = nullptr;  ///< |V| x 3, m
   std::span<const Triangle> triangles;
-  std::span<const int> triangle_domain;         ///< per triangle; needed by Domain and Dof
-  std::span<const Rgb> domain_colors;           ///< per domain; see domain_palette()
-  std::span<const float> triangle_value;        ///< per triangle; needed by Strain
-  std::span<const DofClass> vertex_class;       ///< per vertex; needed by Dof
+  std::span<const int> triangle_domain;    ///< per triangle; needed by Domain and Dof
+  std::span<const Rgb> domain_colors;      ///< per domain; see domain_palette()
+  std::span<const float> triangle_value;   ///< per triangle; needed by Strain
+  std::span<const DofClass> vertex_class;  ///< per vertex; needed by Dof
 };
 
 struct Camera {
@@ -46,16 +47,19 @@ Camera frame_box(const Vec3& low, const Vec3& high, double aspect, double azimut
 
 struct Style {
   ColorMode color = ColorMode::Domain;
-  bool borders = true;          ///< dark lines between domains
+  bool borders = true;  ///< dark lines between domains
   bool mesh_lines = false;
-  bool ground = true;           ///< ground plane with a soft shadow
-  std::optional<double> ground_height;  ///< m; absent: just below the mesh
-  bool ambient_occlusion = true;
-  int supersampling = 2;        ///< 1, 2 or 3 samples per pixel and axis
-  bool legend = true;           ///< colour bar and title where the mode has one
+  bool shadows = true;  ///< soft shadows of the key light, on cloth and ground
+  bool ground = true;   ///< ground plane (y = const), visible by the shadows on it
+  /// m; absent: just below the mesh. Give one height for all frames of an animation.
+  std::optional<double> ground_height;
+  bool ambient_occlusion = true;           ///< shadows of the sky; off in the fast path
+  int supersampling = 2;                   ///< 1, 2 or 3 samples per pixel and axis
+  bool legend = true;                      ///< Strain: colour bar; Dof: what dots mean, with counts
   float value_low = 0, value_high = 0.1F;  ///< range of the colour bar (Strain)
   std::string value_label = "strain";
-  std::string caption;          ///< small text in the lower left corner, e.g. "t = 0.25 s"
+  std::string caption;              ///< small text in the lower left corner, e.g. "t = 0.25 s"
+  Rgb fabric{0.45F, 0.58F, 0.74F};  ///< colour of the cloth in ColorMode::Shaded
 };
 
 struct Image {
