@@ -14,55 +14,14 @@
 #include <utility>
 #include <vector>
 
-namespace piecework::bench {
+#include <piecework/core/statistics.hpp>
 
-/// Fewest samples that have an interval of 95 %: with 5, even [min, max] holds the median with
-/// 1 - 2 * 0.5^5 = 93.8 % only.
-inline constexpr std::size_t kMinSamplesForInterval = 6;
+namespace piecework::bench {
 
 /// Shortest call, s, whose processor time means something: the kernel brings the clocks of a
 /// process's other threads up to date once a tick (up to 10 ms), so that shorter calls get the
 /// time of their neighbours (seen here: 2.9 "busy threads" in a plain loop).
 inline constexpr double kMinSecondsForCpuTime = 0.02;
-
-/// Median of n samples and the interval that holds the true median with at least 95 %.
-struct MedianInterval {
-  double median = std::numeric_limits<double>::quiet_NaN();  ///< NaN without samples
-  double low = -std::numeric_limits<double>::infinity();     ///< -inf if n < 6
-  double high = std::numeric_limits<double>::infinity();     ///< inf if n < 6
-  std::size_t count = 0;
-};
-
-/// The largest r such that [r-th smallest, r-th largest] of n samples holds the median with at
-/// least 95 %; 0 if there is none. The probability is 1 - 2 P(Binomial(n, 1/2) < r), whatever the
-/// distribution of the samples.
-inline std::size_t median_interval_rank(std::size_t n) {
-  const auto count = static_cast<double>(n);
-  double tail = 0;  // P(Binomial < rank + 1)
-  std::size_t rank = 0;
-  for (;; ++rank) {
-    const auto k = static_cast<double>(rank);
-    tail += std::exp(std::lgamma(count + 1) - std::lgamma(k + 1) - std::lgamma(count - k + 1) -
-                     count * std::log(2.0));
-    if (2 * tail > 0.05 || 2 * (rank + 1) > n) return rank;
-  }
-}
-
-/// Median (mean of the middle two for even n) and its interval.
-inline MedianInterval median_interval(std::vector<double> samples) {
-  MedianInterval result;
-  const std::size_t n = samples.size();
-  result.count = n;
-  if (n == 0) return result;
-  std::sort(samples.begin(), samples.end());
-  result.median = 0.5 * (samples[(n - 1) / 2] + samples[n / 2]);
-  const std::size_t rank = median_interval_rank(n);
-  if (n >= kMinSamplesForInterval && rank > 0) {
-    result.low = samples[rank - 1];
-    result.high = samples[n - rank];
-  }
-  return result;
-}
 
 /// Wall and processor time of this process (all threads), s.
 struct ProcessClock {

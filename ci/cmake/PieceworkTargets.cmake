@@ -7,7 +7,8 @@ add_library(piecework::warnings ALIAS piecework_warnings)
 target_compile_options(piecework_warnings INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor
   -Wold-style-cast -Wcast-qual -Woverloaded-virtual
-  -Wno-missing-field-initializers)  # designated initialisers name what they set
+  -Wno-missing-field-initializers  # designated initialisers name what they set
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)  # GCC 12 sees overlaps in string concatenation (its bug 105651)
 
 # Reproducible bits: no fused contraction that a compiler may or may not choose.
 add_library(piecework_build INTERFACE)

@@ -43,7 +43,7 @@ std::string VanillaPd::description() const {
   return "vanilla PD, Jacobi local step, " + global::CholmodSolver::description();
 }
 
-void VanillaPd::factor(const std::vector<char>& fixed) {
+void VanillaPd::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;
   free_ = model::FreeVertices(fixed);
   increment_.resize(free_.count(), 3);
@@ -61,7 +61,7 @@ StepReport VanillaPd::minimize(const model::StepProblem& problem, Positions& x) 
   StepReport report;
   Stopwatch watch;
   if (fixed_ != *problem.fixed) {
-    factor(*problem.fixed);
+    prepare(*problem.fixed);
     report.phases.refactor = watch.lap();
   }
   report.phases.local = 0;

@@ -20,6 +20,7 @@ class VanillaPd final : public model::Minimizer {
   /// \param gravity  magnitude that turns forces into weights for `gradient`, m/s^2
   VanillaPd(const model::ClothModel& model, double h, double gravity, model::StopOptions stop);
 
+  void prepare(const std::vector<char>& fixed) override;
   model::StepReport minimize(const model::StepProblem& problem, Positions& x) override;
   [[nodiscard]] std::string description() const override;
 
@@ -38,7 +39,6 @@ class VanillaPd final : public model::Minimizer {
     std::deque<double> ratios_;
   };
 
-  void factor(const std::vector<char>& fixed);
   void global_step(Positions& x, model::StepReport& report);
   [[nodiscard]] double relative_gradient() const;
   [[nodiscard]] bool converged(const model::StepReport& report) const;

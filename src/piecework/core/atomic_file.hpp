@@ -19,6 +19,6 @@ std::string read_file(const std::filesystem::path& path,
                       std::size_t max_bytes = std::size_t{1} << 33);
 
 /// Creates a folder and its parents. \throws OutputError with path and reason.
-void create_directories(const std::filesystem::path& path);
+void ensure_directory(const std::filesystem::path& path);
 
 }  // namespace piecework

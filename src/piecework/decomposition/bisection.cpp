@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include <fmt/format.h>
+
 #include <piecework/core/error.hpp>
 
 namespace piecework::decomposition {
@@ -127,6 +129,10 @@ std::size_t Bisector::split(std::span<int> set, double share) {
   }
   std::copy(second.begin(), second.end(), set.begin() + static_cast<std::ptrdiff_t>(first_size));
   return first_size;
+}
+
+std::string metis_version() {
+  return fmt::format("METIS {}.{}.{}", METIS_VER_MAJOR, METIS_VER_MINOR, METIS_VER_SUBMINOR);
 }
 
 }  // namespace piecework::decomposition

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace piecework::decomposition {
@@ -39,5 +40,8 @@ class Bisector {
   std::vector<std::int32_t> begin_, neighbor_, weight_, side_;
   std::vector<int> visited_, queue_;
 };
+
+/// "METIS 5.1.0".
+std::string metis_version();
 
 }  // namespace piecework::decomposition

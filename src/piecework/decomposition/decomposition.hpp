@@ -83,6 +83,9 @@ Decomposition decompose(const Elements& elements, const Options& options);
 /// Counts, edge cut and balance of a decomposition of `elements`.
 Summary summarize(const Decomposition& decomposition, const Elements& elements);
 
+/// "METIS 5.1.0".
+std::string library_version();
+
 /// Pairs of domains that share a mesh edge, each once, ascending.
 std::vector<std::array<int, 2>> adjacent_domains(const Decomposition& decomposition,
                                                  std::span<const mesh::Hinge> hinges);

@@ -27,7 +27,9 @@ Integrator::Integrator(const ClothModel& model, ExternalForces forces, std::vect
       forces_(model, std::move(forces)),
       pins_(std::move(pins), model.start),
       options_(options),
-      minimizer_(std::move(minimizer)) {}
+      minimizer_(std::move(minimizer)) {
+  minimizer_->prepare(pins_.fixed_at(options_.h));
+}
 
 State Integrator::initial_state(const std::vector<Vec3>& part_velocity) const {
   State state;

@@ -22,7 +22,9 @@ struct IntegratorOptions {
 ///     v_{n+1} = (x_{n+1} - x_n) / h                                         [Lu25, Eq. 1]
 class Integrator {
  public:
+  /// Prepares the minimiser for the first step.
   /// \param model  must outlive the integrator.
+  /// \throws SimulationError as Minimizer::prepare().
   Integrator(const ClothModel& model, ExternalForces forces, std::vector<Pin> pins,
              IntegratorOptions options, std::unique_ptr<Minimizer> minimizer);
 

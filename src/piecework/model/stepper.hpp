@@ -62,6 +62,10 @@ class Minimizer {
  public:
   virtual ~Minimizer() = default;
 
+  /// Set-up for a set of held vertices, so that the first step is like the others. Optional.
+  /// \throws SimulationError if K is not positive definite or its factor does not fit into memory.
+  virtual void prepare(const std::vector<char>& fixed) = 0;
+
   /// Improves x (in: start of the iteration, out: the step's end state).
   /// \throws SimulationError if x becomes non-finite or K is not positive definite; x is then void.
   virtual StepReport minimize(const StepProblem& problem, Positions& x) = 0;

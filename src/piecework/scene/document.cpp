@@ -52,13 +52,12 @@ std::string override_source(const std::string& path, const std::string& value) {
 }
 
 Node* member(Object& object, const std::string& key) {
-  for (Member& m : object)
-    if (m.key == key) return &m.value;
+  for (Node& node : object.members)
+    if (node.key == key) return &node;
   return nullptr;
 }
 
-/// The child of `node` that the override goes through next; makes it where
-/// there is none.
+/// The child of `node` that the override goes through next; makes it where there is none.
 Node& descend(Document& document, Node& node, const Place& place, const std::string& pointer,
               const std::string& step) {
   if (node.is_null() && node.place.line == 0 && node.place.source == place.source) {
@@ -69,8 +68,8 @@ Node& descend(Document& document, Node& node, const Place& place, const std::str
   }
   if (auto* object = std::get_if<Object>(&node.data)) {
     if (Node* found = member(*object, step)) return *found;
-    object->push_back({step, place, Node{nullptr, place}});
-    return object->back().value;
+    object->members.push_back({nullptr, place, step, place});
+    return object->members.back();
   }
   auto* list = std::get_if<List>(&node.data);
   if (list == nullptr)
@@ -85,16 +84,16 @@ Node& descend(Document& document, Node& node, const Place& place, const std::str
              ? "set the whole list"
              : fmt::format("use a number from 0 to {}, {} to append, or set the whole list",
                            list->size() - 1, list->size()));
-  if (index == list->size()) list->push_back(Node{nullptr, place});
+  if (index == list->size()) list->push_back({nullptr, place, {}, {}});
   return (*list)[index];
 }
 
 }  // namespace
 
-const Node* Node::find(std::string_view key) const {
-  if (const Object* members = object())
-    for (const Member& m : *members)
-      if (m.key == key) return &m.value;
+const Node* Node::find(std::string_view name) const {
+  if (const List* members = object())
+    for (const Node& member : *members)
+      if (member.key == name) return &member;
   return nullptr;
 }
 
@@ -124,7 +123,8 @@ void apply_override(Document& document, const std::string& path, const std::stri
     node = &descend(document, *node, place, pointer, step);
     pointer += pointer_step(step);
   }
-  *node = std::move(parsed);
+  node->data = std::move(parsed.data);
+  node->place = place;
 }
 
 void fail(const Document& document, const Place& place, const std::string& pointer,

@@ -27,9 +27,8 @@ std::string reason(const std::string& message) {
   return text;
 }
 
-/// Receives the parser's events and builds the tree. Each event belongs to the
-/// next token that is neither ',' nor ':', so a walk over the tokens in step
-/// with the events gives the positions.
+/// Receives the parser's events and builds the tree. Each event belongs to the next token that is
+/// neither ',' nor ':', so a walk over the tokens in step with the events gives the positions.
 class Builder : public nlohmann::json_sax<Json> {
  public:
   Builder(const Document& document, std::string_view text, std::string base_pointer, bool places)
@@ -109,21 +108,21 @@ class Builder : public nlohmann::json_sax<Json> {
     if (++count_ > kMaxValues)
       fail(document_, place, pointer(), fmt::format("more than {} values", kMaxValues),
            "name vertices by sets or boxes instead of listing them");
-    if (open_.empty()) {
-      root_ = {std::move(data), place};
-      return root_;
-    }
-    // Only the innermost open container grows, so pointers to the outer ones
-    // stay valid.
+    List* siblings = nullptr;
+    Node node{std::move(data), place, {}, {}};
+    if (open_.empty()) return root_ = std::move(node);
+    // Only the innermost open container grows, so pointers to the outer ones stay valid.
     Open& top = open_.back();
     if (auto* object = std::get_if<Object>(&top.node->data)) {
-      object->push_back({top.key, top.key_place, {std::move(data), place}});
+      siblings = &object->members;
+      node.key = std::move(top.key);
+      node.key_place = top.key_place;
       top.key.clear();
-      return object->back().value;
+    } else {
+      siblings = &std::get<List>(top.node->data);
     }
-    List& list = std::get<List>(top.node->data);
-    list.push_back({std::move(data), place});
-    return list.back();
+    siblings->push_back(std::move(node));
+    return siblings->back();
   }
 
   bool open(decltype(Node::data) data) {
@@ -156,8 +155,8 @@ class Builder : public nlohmann::json_sax<Json> {
     return text;
   }
 
-  /// The token at which the parser gave up after consuming `position` bytes;
-  /// `previous` becomes the one before it.
+  /// The token at which the parser gave up after consuming `position` bytes; `previous` becomes the
+  /// one before it.
   Token find_offending(std::size_t position, std::string_view message, Token& previous) const {
     // The lexer stops one byte after the end of a bad word, number, comment or open string.
     bool one_after = false;
@@ -179,8 +178,7 @@ class Builder : public nlohmann::json_sax<Json> {
     return token;
   }
 
-  /// What to tell about the token `offending`, which follows `before`; `detail`
-  /// is nlohmann's view.
+  /// What to tell about the token `offending`, which follows `before`; `detail` is nlohmann's view.
   SyntaxError explain(const Token& before, const Token& offending, std::string detail) const {
     const std::string_view text = offending.in(text_), previous = before.in(text_);
     const std::string word = printable(text);
@@ -241,8 +239,7 @@ class Builder : public nlohmann::json_sax<Json> {
 Node parse(const Document& document, std::string_view text, const std::string& base_pointer,
            bool places) {
   Builder builder(document, text, base_pointer, places);
-  // Every failure leaves the builder as an exception; nlohmann's result has
-  // nothing to add.
+  // Every failure leaves the builder as an exception; nlohmann's result has nothing to add.
   (void)Json::sax_parse(text.begin(), text.end(), &builder, nlohmann::detail::input_format_t::json,
                         /*strict=*/true, /*ignore_comments=*/true);
   return builder.take();
@@ -283,9 +280,8 @@ Node parse_override(const Document& document, std::string_view text, const std::
   const bool readable = text.find('\0') == std::string_view::npos && text.size() <= kMaxTextBytes;
   if (readable && (opens_like_json || is_number(text) || is_json(text)))
     return parse(document, text, pointer, /*places=*/false);
-  Node node{std::string(text), place};
-  // Text goes into files and messages, which are UTF-8: nlohmann's lexer is the
-  // judge.
+  Node node{std::string(text), place, {}, {}};
+  // Text goes into files and messages, which are UTF-8: nlohmann's lexer is the judge.
   const std::string quoted = Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
   if (Json::parse(quoted).get<std::string>() != text)
     fail(document, place, pointer, "the text is not UTF-8", "write it in UTF-8");

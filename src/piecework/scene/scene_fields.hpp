@@ -1,25 +1,21 @@
 #pragma once
 
-// Private to the module: the one declaration of every key of a scene. A visitor
-// is handed each key with the member it fills; the reader, the resolved scene,
-// the JSON Schema and the reference page are four visitors. Defaults are those
-// of the structs in scene.hpp.
+// Private to the module: the one declaration of every key of a scene. A visitor is handed each
+// key with the member it fills; the reader, the resolved scene, the JSON Schema and the reference
+// page are four visitors. Defaults are those of the structs in scene.hpp.
 //
-// A visitor V has:
-//   void about(const char* title, const char* doc)              once, first,
-//   per struct void value(const Key&, T& member, const Range& = {})        T:
-//   double, int, bool, std::string,
-//                                                    std::array, std::vector,
-//                                                    std::optional of these
-//   void choice(const Key&, std::string& member, const Choices&)
-//   void object(const Key&, T& or std::optional<T>& member)     nested struct
-//   void list(const Key&, std::vector<T>& member)               list of structs
-//   void map(const Key&, std::map<std::string, T>& member)      structs by name
-//   void exactly_one(const Names&) / void at_least_one(const Names&)   last:
-//   keys that must be given
+// A visitor has
+//   about(const char* title, const char* doc)     first, once per struct
+//   value(const Key&, T&, const Range& = {})      T: double, int, bool, std::string, and
+//   std::array,
+//                                                 std::vector, std::optional of these
+//   choice(const Key&, std::string&, const Choices&)
+//   object(const Key&, T&)                        T: a struct, or std::optional of one
+//   list(const Key&, std::vector<T>&)             structs in order
+//   map(const Key&, std::map<std::string, T>&)    structs by name
+//   exactly_one(const Names&), at_least_one(const Names&)    which keys must be given
 //
-// Keys are declared in the order in which they are best read; a key's `applies`
-// may depend on members declared before it.
+// Whether a key `applies` may depend on members declared before it.
 
 #include <initializer_list>
 #include <limits>
@@ -59,8 +55,7 @@ struct Key {
   }
 };
 
-/// Limits of a number, or of each number of a list; of the length of a text or
-/// list.
+/// Limits of a number, or of each number of a list; of the length of a text or list.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();

@@ -21,8 +21,7 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, ignored);
 }
 
-/// \throws InputError if PIECEWORK_SCENES is set to something that is no
-/// folder.
+/// \throws InputError if PIECEWORK_SCENES is set to something that is no folder.
 fs::path scenes_folder() {
   if (const char* named = std::getenv("PIECEWORK_SCENES"); named && *named) {
     if (!is_folder(named))
@@ -48,8 +47,8 @@ std::string description_of(const fs::path& path) {
   }
 }
 
-/// The file that `name` means. \throws InputError with the nearest built-in
-/// names.
+/// The file that `name` means.
+/// \throws InputError with the nearest built-in names.
 fs::path find_scene(const fs::path& name) {
   std::error_code ignored;
   if (fs::exists(name, ignored) && !is_folder(name)) return name;

@@ -1,7 +1,6 @@
 #pragma once
 
-// Private to the module, and included by .cpp files only: values of scene
-// members as JSON.
+// Private to the module, and included by .cpp files only: values of scene members as JSON.
 
 #include <array>
 #include <optional>
@@ -25,8 +24,7 @@ OrderedJson to_json_value(const std::optional<T>& value) {
   return value ? to_json_value(*value) : OrderedJson(nullptr);
 }
 
-/// True if leaving the key out says the same: an absent optional, an empty text
-/// or list.
+/// True if leaving the key out says the same: an absent optional, an empty text or list.
 template <class T>
 bool says_nothing(const T&) {
   return false;
@@ -41,8 +39,7 @@ bool says_nothing(const std::vector<T>& value) {
 }
 inline bool says_nothing(const std::string& value) { return value.empty(); }
 
-/// JSON text with two spaces per level and lists of plain values on one line,
-/// newline at the end.
+/// JSON text with two spaces per level and lists of plain values on one line, newline at the end.
 std::string to_text(const OrderedJson& json);
 
 }  // namespace piecework::scene

@@ -44,8 +44,7 @@ struct KeyNames : IgnoreRules {
   }
 };
 
-/// The first place in the whole scene that knows the key `wanted`, dotted;
-/// "cloths.0.pins".
+/// The first place in the whole scene that knows the key `wanted`, dotted; "cloths.0.pins".
 struct KeyFinder : IgnoreRules {
   std::string wanted, path, found;
   void see(const Key& key) {
@@ -101,8 +100,7 @@ std::string range_words(const Range& range, bool integer) {
   return text;
 }
 
-/// A pointer that costs nothing until it is needed: a chain of steps on the
-/// stack.
+/// A pointer that costs nothing until it is needed: a chain of steps on the stack.
 struct Trail {
   const Trail* parent = nullptr;
   std::string_view key;
@@ -180,16 +178,16 @@ class Reader {
     const Node* node = given(key);
     if (node == nullptr) return;
     const Trail trail{&trail_, key.name};
-    const Object* members = node->object();
+    const List* members = node->object();
     if (members == nullptr)
       wrong_type(*node, trail, "an object of named entries", "write { \"name\": { ... }, ... }");
     if (key.required && members->empty())
       stop(*node, trail, fmt::format("\"{}\" is empty", key.name), "define at least one");
     member.clear();
-    for (const Member& entry : *members) {
+    for (const Node& entry : *members) {
       if (entry.key.empty())
-        fail(document_, entry.place, trail.text(), "an entry without a name", "name it");
-      nested(entry.value, {&trail, entry.key}, member[entry.key]);
+        fail(document_, entry.key_place, trail.text(), "an entry without a name", "name it");
+      nested(entry, {&trail, entry.key}, member[entry.key]);
     }
   }
 
@@ -208,8 +206,7 @@ class Reader {
   }
 
  private:
-  /// The value of a key if it is given. Refuses missing keys and keys that do
-  /// not apply.
+  /// The value of a key if it is given. Refuses missing keys and keys that do not apply.
   const Node* given(const Key& key) const {
     const Node* node = node_.find(key.name);
     if (node == nullptr && key.required)
@@ -236,9 +233,9 @@ class Reader {
     KeyNames known;
     fields(known, target);
     const std::set<std::string> names(known.names.begin(), known.names.end());
-    for (const Member& member : *node_.object()) {
+    for (const Node& member : *node_.object()) {
       if (names.contains(member.key)) continue;
-      fail(document_, member.place, Trail{&trail_, member.key}.text(),
+      fail(document_, member.key_place, Trail{&trail_, member.key}.text(),
            fmt::format("unknown key \"{}\"", printable(member.key)),
            remedy(member.key, known.names));
     }

@@ -80,8 +80,7 @@ std::string range_text(const Range& range) {
   return high ? fmt::format("<= {}", range.max) : "";
 }
 
-/// Collects one section per struct, in the order in which the structs are first
-/// named.
+/// Collects one section per struct, in the order in which the structs are first named.
 class Page {
  public:
   std::string text = kIntroduction;
@@ -134,8 +133,7 @@ class SectionWriter {
   void exactly_one(const Names& names) { rules_ += sentence("Exactly one of", names); }
   void at_least_one(const Names& names) { rules_ += sentence("At least one of", names); }
 
-  /// Adds the section of T and those of its members, unless they are there;
-  /// gives its title.
+  /// Adds the section of T and those of its members, unless they are there; gives its title.
   template <class T>
   static std::string add_section(Page& page) {
     SectionWriter writer(page);

@@ -111,9 +111,9 @@ void check_expectation(const Expectation& expected, const Scene& scene, const Pa
 void check_overridden_materials(const Scene& scene, const Document& document, const Part& part) {
   std::vector<std::string> used;
   for (const Cloth& cloth : scene.cloths) used.push_back(cloth.material);
-  for (const Member& entry : *document.root.find("materials")->object())
+  for (const Node& entry : *document.root.find("materials")->object())
     part.in(entry.key).require(
-        entry.place.line > 0 || std::find(used.begin(), used.end(), entry.key) != used.end(),
+        entry.key_place.line > 0 || std::find(used.begin(), used.end(), entry.key) != used.end(),
         fmt::format("no cloth uses a material \"{}\"", printable(entry.key)),
         suggestion(entry.key, used, "materials"));
 }

@@ -7,9 +7,9 @@
 
 namespace piecework::scene {
 
-/// Checks references by name (materials, cloths) and orders (min <= max, start
-/// <= stop) of a scene that was read from `document`. \throws InputError at the
-/// place of the first fault.
+/// Checks references by name (materials, cloths) and orders (min <= max, start <= stop) of a scene
+/// that was read from `document`.
+/// \throws InputError at the place of the first fault.
 void check_rules(const Scene& scene, const Document& document);
 
 }  // namespace piecework::scene

@@ -59,8 +59,7 @@ void print(const OrderedJson& json, const std::string& indent, std::string& out)
     return item.is_object() || (item.is_array() && !item.empty() && item.front().is_object());
   });
   if (!json.is_structured() || json.empty()) {
-    // Text that is not UTF-8 can only come from a Scene made in memory; it must
-    // not stop a run.
+    // Text that is not UTF-8 can only come from a Scene made in memory; it must not stop a run.
     out += json.dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
     return;
   }

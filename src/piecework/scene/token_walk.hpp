@@ -1,9 +1,8 @@
 #pragma once
 
-// Private to the module: walks over the tokens of JSON text, counting lines and
-// columns. It does not judge the text (nlohmann's parser does); it only says
-// where each token begins, so it must find the same tokens in valid text, and
-// must not run past the end of any text.
+// Private to the module: walks over the tokens of JSON text, counting lines and columns. It does
+// not judge the text (nlohmann's parser does); it only says where each token begins, so it must
+// find the same tokens in valid text, and must not run past the end of any text.
 
 #include <cstdint>
 #include <string_view>
@@ -26,8 +25,7 @@ class TokenWalk {
     if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // the byte order mark has no column
   }
 
-  /// The next token: a string with its quotes, one of []{},: or a run of other
-  /// characters.
+  /// The next token: a string with its quotes, one of []{},: or a run of other characters.
   Token next() {
     skip_blanks();
     Token token{at_, at_, line_, column_};

@@ -1,0 +1,179 @@
+#include "pictures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include <piecework/core/error.hpp>
+#include <piecework/decomposition/decomposition.hpp>
+#include <piecework/model/measures.hpp>
+#include <piecework/runner/checkpoint.hpp>
+#include <piecework/runner/run.hpp>
+#include <renderer/png.hpp>
+
+namespace piecework::cli {
+namespace {
+
+render::ColorMode color_mode(const std::string& name) {
+  if (name == "domain") return render::ColorMode::Domain;
+  if (name == "dof") return render::ColorMode::Dof;
+  if (name == "strain") return render::ColorMode::Strain;
+  if (name == "shaded") return render::ColorMode::Shaded;
+  throw InputError(fmt::format("color \"{}\" is unknown; use domain, dof, strain or shaded", name));
+}
+
+render::Provider provider(const std::string& name) {
+  if (name == "osmesa") return render::Provider::Osmesa;
+  if (name == "egl") return render::Provider::Egl;
+  return render::Provider::Auto;
+}
+
+/// What all pictures of a series share.
+struct Extent {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high = -low;
+  float strain = 0;  ///< 99th percentile, largest of all shots
+};
+
+float percentile_99(std::vector<float> values) {
+  if (values.empty()) return 0;
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) * 99 / 100);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+Extent measure(const runner::World& world, const std::vector<Shot>& shots, bool strain) {
+  Extent extent;
+  for (const Shot& shot : shots) {
+    const Positions x = shot.positions();
+    extent.low = extent.low.cwiseMin(x.colwise().minCoeff().transpose());
+    extent.high = extent.high.cwiseMax(x.colwise().maxCoeff().transpose());
+    if (strain) extent.strain = std::max(extent.strain, percentile_99(model::triangle_strain(world.model, x)));
+  }
+  return extent;
+}
+
+/// A round number not below `value`: 1, 2, 2.5 or 5 times a power of ten.
+float round_up(float value) {
+  if (!(value > 0)) return 0.01F;
+  const float power = std::pow(10.0F, std::floor(std::log10(value)));
+  for (const float step : {1.0F, 2.0F, 2.5F, 5.0F, 10.0F})
+    if (value <= step * power * 1.0001F) return step * power;
+  return value;
+}
+
+Vec3 vec(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
+
+render::Camera make_camera(const scene::Camera& wish, const Extent& extent, double aspect) {
+  render::Camera camera = render::frame_box(extent.low, extent.high, aspect, wish.azimuth, wish.elevation, wish.fov);
+  if (wish.position) camera.eye = vec(*wish.position);
+  if (wish.target) camera.target = vec(*wish.target);
+  return camera;
+}
+
+/// Encodes pictures one behind the drawing.
+class Encoder {
+ public:
+  void write(const std::filesystem::path& path, render::Image image) {
+    wait();
+    pending_ = std::async(std::launch::async, [path, image = std::move(image)] { render::write_png(path, image); });
+  }
+  void wait() {
+    if (pending_.valid()) pending_.get();
+  }
+
+ private:
+  std::future<void> pending_;
+};
+
+}  // namespace
+
+PictureOptions picture_options(const scene::Scene& scene) {
+  return {.width = scene.render.size[0],
+          .height = scene.render.size[1],
+          .color = scene.render.color,
+          .borders = scene.render.borders,
+          .mesh_lines = scene.render.mesh_lines};
+}
+
+void check_pictures(const PictureOptions& options) {
+  (void)color_mode(options.color);
+  const render::Renderer probe(provider(options.gl), options.width, options.height);
+}
+
+void take_pictures(const runner::World& world, const std::vector<Shot>& shots, const PictureOptions& options,
+                   Progress& progress) {
+  render::Style style;
+  style.color = color_mode(options.color);
+  style.borders = options.borders;
+  style.mesh_lines = options.mesh_lines;
+  style.shadows = style.ambient_occlusion = !options.fast;
+  const bool strain = style.color == render::ColorMode::Strain;
+
+  render::Renderer renderer(provider(options.gl), options.width, options.height);
+  const Extent extent = measure(world, shots, strain);
+  const double margin = 0.02 * (extent.high - extent.low).maxCoeff();
+  style.ground_height = world.scene.camera.ground.value_or(extent.low.y() - margin);
+  style.value_high = round_up(extent.strain);
+  const render::Camera camera =
+      make_camera(world.scene.camera, extent, static_cast<double>(options.width) / options.height);
+  const auto adjacent = decomposition::adjacent_domains(world.domains, world.model.hinges);
+  const std::vector<render::Rgb> colors = render::domain_palette(world.domains.num_domains, adjacent);
+  std::vector<render::DofClass> classes;
+  for (int v = 0; style.color == render::ColorMode::Dof && v < world.model.num_vertices(); ++v)
+    classes.push_back(static_cast<render::DofClass>(world.domains.dof_class(v)));
+
+  Encoder encoder;
+  progress.start(0, static_cast<int>(shots.size()));
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const Positions x = shots[i].positions();
+    std::vector<float> values;
+    if (strain) values = model::triangle_strain(world.model, x);
+    style.caption = shots[i].caption.empty() ? fmt::format("t = {:.3f} s", shots[i].time) : shots[i].caption;
+    render::Image image = renderer.draw({.positions = &x,
+                                         .triangles = world.model.triangles,
+                                         .triangle_domain = world.domains.triangle_domain,
+                                         .domain_colors = colors,
+                                         .triangle_value = values,
+                                         .vertex_class = classes},
+                                        camera, style);
+    encoder.write(shots[i].path, std::move(image));
+    progress.update(static_cast<int>(i + 1), "");
+  }
+  encoder.wait();
+  progress.finish();
+}
+
+void write_contact_sheet(const std::vector<Shot>& shots, const std::filesystem::path& path, int count) {
+  const int last = static_cast<int>(shots.size()) - 1;
+  const int pictures = std::min(count, last + 1);
+  std::vector<render::Image> images;
+  std::vector<std::string> captions;
+  for (int k = 0; k < pictures; ++k) {
+    const Shot& shot = shots[static_cast<std::size_t>(pictures > 1 ? k * last / (pictures - 1) : 0)];
+    images.push_back(render::read_png(shot.path));
+    captions.push_back(fmt::format("t = {:.3f} s", shot.time));
+  }
+  render::write_png(path, render::contact_sheet(images, captions, std::min(4, pictures), 480));
+}
+
+std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem::path& directory, int first, int last,
+                               const std::string& pattern) {
+  const std::string hash = runner::motion_hash(world.scene);
+  std::vector<Shot> shots;
+  for (int frame = first; frame <= last; ++frame) {
+    const std::filesystem::path state = directory / "state" / (runner::frame_name(frame) + ".bin");
+    const auto positions = [&world, state, hash] {
+      return runner::read_state(state, hash, world.model.num_vertices()).x;
+    };
+    shots.push_back({.positions = positions,
+                     .time = frame * world.scene.step.output_every * world.scene.step.h,
+                     .path = directory / fmt::format(fmt::runtime(pattern), fmt::arg("frame", frame))});
+  }
+  return shots;
+}
+
+}  // namespace piecework::cli

@@ -1,0 +1,194 @@
+// piecework run: simulate a scene, draw its frames, write its tables.
+
+#include <atomic>
+#include <csignal>
+#include <filesystem>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <piecework/core/error.hpp>
+#include <piecework/runner/run.hpp>
+#include <piecework/scene/scene_io.hpp>
+
+#include "commands.hpp"
+#include "pictures.hpp"
+#include "progress.hpp"
+
+namespace piecework::cli {
+namespace {
+
+constexpr const char* kExamples =
+    "Simulate a scene into a directory: frames, run.json, timings.csv, summary.md.\n\n"
+    "Examples:\n"
+    "  piecework run hanging_tablecloth -o out/cloth\n"
+    "  piecework run scene.json -o out/a --frames 30 --threads 1 --set quality.tolerance=1e-3\n"
+    "  piecework run scene.json -o out/b --no-images --export ply --export obj\n"
+    "  piecework run scene.json -o out/c --checkpoint-every 10     # kill it at any time, then:\n"
+    "  piecework run scene.json -o out/c --resume                  # same bits as unbroken";
+
+std::atomic<int> stop_signal{0};
+static_assert(std::atomic<int>::is_always_lock_free);
+
+void on_signal(int signal) { stop_signal = signal; }
+
+/// The first Ctrl-C stops after the frame in progress, with a checkpoint; a second one kills.
+class SignalGuard {
+ public:
+  SignalGuard() {
+    struct sigaction action {};
+    action.sa_handler = on_signal;
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigaction(SIGINT, &action, &old_int_);
+    sigaction(SIGTERM, &action, &old_term_);
+  }
+  ~SignalGuard() {
+    sigaction(SIGINT, &old_int_, nullptr);
+    sigaction(SIGTERM, &old_term_, nullptr);
+  }
+  SignalGuard(const SignalGuard&) = delete;
+  SignalGuard& operator=(const SignalGuard&) = delete;
+
+ private:
+  struct sigaction old_int_ {};
+  struct sigaction old_term_ {};
+};
+
+struct RunArguments {
+  std::string scene;
+  std::string directory;
+  int frames = -1;
+  int threads = 0;
+  std::vector<std::string> set;
+  bool no_images = false;
+  bool no_state = false;
+  bool fast_images = false;
+  std::vector<std::string> exports;
+  int checkpoint_every = 0;
+  bool resume = false;
+  bool overwrite = false;
+  bool expect = false;
+  std::string gl = "auto";
+  std::string size;
+  std::string color;
+};
+
+class ConsoleObserver : public runner::RunObserver {
+ public:
+  explicit ConsoleObserver(const Verbosity& verbosity) : verbosity_(verbosity), progress_("simulating", verbosity.quiet) {}
+
+  void started(const runner::World& world, int first_frame, int frames) override {
+    if (!verbosity_.quiet) {
+      const auto& s = world.domain_summary;
+      fmt::print(stderr, "{}: {} vertices, {} triangles, {} domains (C|B|R {}|{}|{}, balance {:.3f})\n", world.scene.name,
+                 world.model.num_vertices(), world.model.triangles.size(), s.domains, s.corner, s.boundary, s.remainder, s.balance);
+      for (const std::string& note : world.notes) fmt::print(stderr, "note: {}\n", note);
+      if (first_frame > 0 && first_frame < frames) fmt::print(stderr, "continuing after frame {}\n", first_frame);
+      if (first_frame >= frames && first_frame > 0)
+        fmt::print(stderr, "all {} frames are there already; --overwrite runs them again\n", frames);
+    }
+    progress_.start(first_frame, frames);
+  }
+
+  void frame_done(const runner::World&, const model::State&, int frame, const runner::FrameRecord* record) override {
+    if (record == nullptr) return;
+    progress_.update(frame, fmt::format("{:.3g} ms/step, {:.3g} it, gradient {:.1e}", record->step_ms,
+                                        double(record->iterations) / record->steps, record->gradient));
+  }
+
+  bool should_stop() override { return stop_signal != 0; }
+
+  void finish() { progress_.finish(); }
+
+ private:
+  const Verbosity& verbosity_;
+  Progress progress_;
+};
+
+mesh::ExportFormat export_format(const std::string& name) {
+  return name == "obj" ? mesh::ExportFormat::Obj : name == "vtp" ? mesh::ExportFormat::Vtp : mesh::ExportFormat::Ply;
+}
+
+PictureOptions pictures_for(const scene::Scene& scene, const RunArguments& arguments) {
+  PictureOptions options = picture_options(scene);
+  options.gl = arguments.gl;
+  options.fast = arguments.fast_images;
+  if (!arguments.color.empty()) options.color = arguments.color;
+  if (!arguments.size.empty()) std::tie(options.width, options.height) = parse_size(arguments.size);
+  return options;
+}
+
+void draw(const runner::RunOutcome& outcome, const RunArguments& arguments, const Verbosity& verbosity) {
+  const std::filesystem::path directory = arguments.directory;
+  const auto shots = shots_of_run(*outcome.world, directory, 0, outcome.frames_done, "frame_{frame:04}.png");
+  Progress progress("drawing", verbosity.quiet);
+  take_pictures(*outcome.world, shots, pictures_for(outcome.world->scene, arguments), progress);
+  write_contact_sheet(shots, directory / "contact_sheet.png");
+  std::error_code ignored;
+  if (arguments.no_state) std::filesystem::remove_all(directory / "state", ignored);
+}
+
+int report(const runner::RunOutcome& outcome, const RunArguments& arguments) {
+  for (const auto& e : outcome.record.expectations)
+    if (!e.holds) fmt::print(stderr, "expectation fails: {}; found {:.6g}\n", e.text, e.value);
+  if (outcome.stopped) {
+    fmt::print(stderr, "stopped after frame {}; continue with --resume\n", outcome.frames_done);
+    return 128 + stop_signal;
+  }
+  fmt::print("{}\n", (std::filesystem::path(arguments.directory) / "summary.md").string());
+  return static_cast<int>(arguments.expect && !outcome.expectations_hold() ? ExitCode::CheckFailed : ExitCode::Ok);
+}
+
+int run(const RunArguments& arguments, const Verbosity& verbosity) {
+  runner::RunOptions options;
+  for (const std::string& text : arguments.set) options.overrides.push_back(parse_override(text));
+  const scene::Scene scene = scene::load_scene(arguments.scene, options.overrides);
+  options.directory = arguments.directory.empty() ? "out/" + scene.name : arguments.directory;
+  options.frames = arguments.frames;
+  options.threads = arguments.threads;
+  options.checkpoint_every = arguments.checkpoint_every;
+  options.resume = arguments.resume;
+  options.overwrite = arguments.overwrite;
+  options.save_states = !arguments.no_state || !arguments.no_images;
+  for (const std::string& name : arguments.exports) options.exports.push_back(export_format(name));
+  // Without OpenGL a run with pictures would fail only at its end: find out now.
+  if (!arguments.no_images) check_pictures(pictures_for(scene, arguments));
+
+  const SignalGuard guard;
+  ConsoleObserver observer(verbosity);
+  const runner::RunOutcome outcome = runner::run(scene, options, observer);
+  observer.finish();
+  RunArguments resolved = arguments;
+  resolved.directory = options.directory.string();
+  if (!arguments.no_images && !outcome.stopped) draw(outcome, resolved, verbosity);
+  return report(outcome, resolved);
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, Action& action, const Verbosity& verbosity) {
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App* app = program.add_subcommand("run", kExamples);
+  app->add_option("scene", arguments->scene, "Scene file, or the name of a built-in scene")->required();
+  app->add_option("-o,--output", arguments->directory, "Directory [out/<scene name>]");
+  app->add_option("--frames", arguments->frames, "Frames to simulate [as the scene says]")->check(CLI::NonNegativeNumber);
+  app->add_option("--threads", arguments->threads, "Threads [as the scene says, else all]")->check(CLI::Range(1, 1024));
+  app->add_option("--set", arguments->set, "Override a scene key: key=value, e.g. solver.domains=16")->allow_extra_args(false);
+  app->add_flag("--no-images", arguments->no_images, "Draw nothing; needs no OpenGL");
+  app->add_flag("--no-state", arguments->no_state, "Keep no state/ files (`piecework render` needs them)");
+  app->add_flag("--fast-images", arguments->fast_images, "No shadows, no ambient occlusion");
+  app->add_option("--color", arguments->color, "domain, dof, strain or shaded [as the scene says]")
+      ->check(CLI::IsMember({"domain", "dof", "strain", "shaded"}));
+  app->add_option("--size", arguments->size, "Picture size, e.g. 1920x1080 [as the scene says]");
+  app->add_option("--export", arguments->exports, "Also write each frame's mesh: ply, obj or vtp")
+      ->check(CLI::IsMember({"ply", "obj", "vtp"}))->allow_extra_args(false);
+  app->add_option("--checkpoint-every", arguments->checkpoint_every, "Frames between checkpoints [at the end only]")
+      ->check(CLI::NonNegativeNumber);
+  app->add_flag("--resume", arguments->resume, "Continue an interrupted run from its checkpoint");
+  app->add_flag("--overwrite", arguments->overwrite, "Replace what an earlier run left in the directory");
+  app->add_flag("--expect", arguments->expect, "Exit with 5 if an expectation of the scene fails");
+  app->add_option("--gl", arguments->gl, "OpenGL provider")->check(CLI::IsMember({"auto", "osmesa", "egl"}));
+  app->callback([arguments, &action, &verbosity] { action = [arguments, &verbosity] { return run(*arguments, verbosity); }; });
+}
+
+}  // namespace piecework::cli

@@ -1,0 +1,27 @@
+#pragma once
+
+// The state of a run on disk: all that is needed to go on with the same bits.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <piecework/model/stepper.hpp>
+#include <piecework/scene/scene.hpp>
+
+namespace piecework::runner {
+
+/// Hash of what determines the motion: the resolved scene without threads, length, pictures and
+/// expectations. A checkpoint may be continued under another number of threads or steps.
+std::string motion_hash(const scene::Scene& scene);
+
+/// Writes step, time, x and v (double, bit for bit) with the scene's motion hash and a checksum.
+/// \throws OutputError.
+void write_state(const std::filesystem::path& path, const model::State& state, const std::string& hash);
+
+/// Reads what write_state() wrote.
+/// \param num_vertices  the file must have as many.
+/// \throws InputError if the file is missing, damaged, or belongs to another scene.
+model::State read_state(const std::filesystem::path& path, const std::string& hash, int num_vertices);
+
+}  // namespace piecework::runner

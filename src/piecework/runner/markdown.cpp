@@ -1,0 +1,165 @@
+// summary.md: the tables of a run as they are pasted into a paper or a pull request.
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <piecework/core/statistics.hpp>
+#include <piecework/runner/record.hpp>
+
+namespace piecework::runner {
+namespace {
+
+constexpr const char* kOff = "-";
+
+/// Three significant digits, without exponent where a person would not write one.
+std::string three_digits(double value) {
+  if (value == 0) return "0";
+  if (!std::isfinite(value)) return kOff;
+  const double size = std::abs(value);
+  if (size < 1e-3 || size >= 1e6) return fmt::format("{:.2e}", value);
+  const int decimals = std::max(0, 2 - static_cast<int>(std::floor(std::log10(size))));
+  return fmt::format("{:.{}f}", value, decimals);
+}
+
+std::string milliseconds(double value) { return value < 0 ? kOff : three_digits(value); }
+
+using Column = std::function<double(const FrameRecord&)>;
+
+std::vector<double> values(const RunRecord& record, const Column& column) {
+  std::vector<double> result;
+  for (const FrameRecord& frame : record.frames) {
+    const double value = column(frame);
+    if (value >= 0) result.push_back(value);
+  }
+  return result;
+}
+
+double mean(const std::vector<double>& v) {
+  return v.empty() ? -1 : std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
+}
+
+/// "12.3 [11.9-12.8]": median and its 95 % interval.
+std::string median_cell(const std::vector<double>& v) {
+  if (v.empty()) return kOff;
+  const MedianInterval m = median_interval(v);
+  if (m.count < kMinSamplesForInterval) return three_digits(m.median);
+  return fmt::format("{} [{}-{}]", three_digits(m.median), three_digits(m.low), three_digits(m.high));
+}
+
+/// The columns of the paper's Table 1; what this run does not have is "-".
+std::string table_one(const RunRecord& record, const World& world) {
+  const auto phase = [&](double model::PhaseTimes::*member) {
+    const auto v = values(record, [&](const FrameRecord& f) { return f.phases.*member; });
+    // Per step of the run, as in the paper: a phase that ran in few steps is spread over all.
+    return v.empty() ? std::string(kOff)
+                     : three_digits(std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(record.frames.size()));
+  };
+  const std::vector<double> steps = values(record, [](const FrameRecord& f) { return f.step_ms; });
+  const MedianInterval median = median_interval(steps);
+  const auto& s = world.domain_summary;
+  const double iterations = mean(values(record, [](const FrameRecord& f) { return double(f.iterations) / f.steps; }));
+  std::string text =
+      "| Scene | # D | # DOF | # Elements | # C\\|B\\|R | # its | Cull | Nrw. | L | G | Ref. | SD | PCG | Misc. | Min | Max | Med | Avg |\n"
+      "|:--|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
+  text += fmt::format("| {} | {} | {} | {} | {}\\|{}\\|{} | {} | - | - | {} | {} | {} | - | - | {} | {} | {} | {} | {} |\n",
+                      world.scene.name, s.domains, 3 * world.model.num_vertices(), world.model.triangles.size(),
+                      s.corner, s.boundary, s.remainder, three_digits(iterations),
+                      phase(&model::PhaseTimes::local), phase(&model::PhaseTimes::global),
+                      phase(&model::PhaseTimes::refactor), phase(&model::PhaseTimes::misc),
+                      three_digits(*std::min_element(steps.begin(), steps.end())),
+                      three_digits(*std::max_element(steps.begin(), steps.end())), three_digits(median.median),
+                      three_digits(mean(steps)));
+  return text;
+}
+
+std::string phase_table(const RunRecord& record) {
+  const std::vector<double> steps = values(record, [](const FrameRecord& f) { return f.step_ms; });
+  const double total = std::accumulate(steps.begin(), steps.end(), 0.0);
+  std::string text = fmt::format("| Phase | ms per step, median [95 % interval] | mean | share | n |\n|:--|--:|--:|--:|--:|\n");
+  const auto row = [&](const char* name, const Column& column) {
+    const std::vector<double> v = values(record, column);
+    const double sum = std::accumulate(v.begin(), v.end(), 0.0);
+    const std::string share = v.empty() ? kOff : fmt::format("{:.1f} %", 100 * sum / total);
+    text += fmt::format("| {} | {} | {} | {} | {} |\n", name, median_cell(v), milliseconds(mean(v)), share, v.size());
+  };
+  row("Local step (L)", [](const FrameRecord& f) { return f.phases.local; });
+  row("Global step (G)", [](const FrameRecord& f) { return f.phases.global; });
+  row("Refactorisation (Ref.)", [](const FrameRecord& f) { return f.phases.refactor; });
+  row("Forces, prediction, velocities (Misc.)", [](const FrameRecord& f) { return f.phases.misc; });
+  row("Other", [](const FrameRecord& f) { return std::max(0.0, f.other_ms()); });
+  row("**Step**", [](const FrameRecord& f) { return f.step_ms; });
+  return text;
+}
+
+std::string accuracy_table(const RunRecord& record) {
+  std::string text = "| Accuracy | median | worst |\n|:--|--:|--:|\n";
+  const auto row = [&](const char* name, const Column& column) {
+    const std::vector<double> v = values(record, column);
+    text += fmt::format("| {} | {} | {} |\n", name, three_digits(median_interval(v).median),
+                        three_digits(v.empty() ? 0 : *std::max_element(v.begin(), v.end())));
+  };
+  row("Gradient (rms nodal residual / mean nodal weight)", [](const FrameRecord& f) { return f.gradient; });
+  row("Estimated position error (mean edge lengths)", [](const FrameRecord& f) { return f.error; });
+  row("L-G iterations per step", [](const FrameRecord& f) { return double(f.iterations) / f.steps; });
+  row("Last increment, 2-norm in the unit box (the paper's stop)", [](const FrameRecord& f) { return f.dx_2; });
+  return text;
+}
+
+std::string convergence_line(const RunRecord& record, const World& world) {
+  int converged = 0;
+  int total = 0;
+  for (const FrameRecord& frame : record.frames) {
+    converged += frame.converged_steps;
+    total += frame.steps;
+  }
+  const scene::Quality& quality = world.scene.quality;
+  std::string rule = quality.stop == "iterations" ? fmt::format("{} iterations", quality.max_iterations)
+                                                  : fmt::format("`{}` <= {:g}, at most {} iterations", quality.stop,
+                                                                quality.tolerance, quality.max_iterations);
+  return fmt::format("Stop rule: {}; {} of {} steps reached it.\n", rule, converged, total);
+}
+
+std::string environment_list(const RunRecord& record) {
+  std::string text;
+  const auto json = nlohmann::ordered_json::parse(record.environment_json);
+  for (const auto& [key, value] : json.items()) text += fmt::format("- {}: {}\n", key, value.get<std::string>());
+  text += fmt::format("- threads: {}\n- load before and after: {:.2f}, {:.2f}\n", record.threads, record.load_before, record.load_after);
+  return text;
+}
+
+std::string expectation_table(const RunRecord& record) {
+  if (record.expectations.empty()) return "";
+  std::string text = "\n## Expectations\n\n| Expectation | found | |\n|:--|--:|:--|\n";
+  for (const ExpectationResult& e : record.expectations)
+    text += fmt::format("| {} | {} | {} |\n", e.text, three_digits(e.value), e.holds ? "holds" : "**FAIL**");
+  return text;
+}
+
+}  // namespace
+
+std::string to_markdown(const RunRecord& record, const World& world) {
+  std::string text = fmt::format("# {}\n\n", world.scene.name);
+  if (!world.scene.description.empty()) text += world.scene.description + "\n\n";
+  if (record.frames.empty()) return text + "No step was simulated.\n";
+  const bool disturbed = record.load_before > 0.5 * record.threads;
+  text += fmt::format("{}, {} threads, h = {:.6g} s. Times in ms per step{}.\n\n", record.method, record.threads,
+                      world.scene.step.h, disturbed ? " †" : "");
+  text += table_one(record, world);
+  text += "\n" + phase_table(record);
+  text += "\n" + accuracy_table(record);
+  text += "\n" + convergence_line(record, world);
+  text += fmt::format("Set-up: load {} ms, domains {} ms, analysis and factorisation {} ms.\n", three_digits(world.load_ms),
+                      three_digits(world.partition_ms), three_digits(record.setup_ms));
+  if (disturbed) text += "\n† Disturbed: other work loaded the machine when the run began.\n";
+  for (const std::string& note : world.notes) text += fmt::format("\nNote: {}.\n", note);
+  text += expectation_table(record);
+  text += "\n## Environment\n\n" + environment_list(record);
+  return text;
+}
+
+}  // namespace piecework::runner

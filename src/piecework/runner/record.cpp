@@ -1,0 +1,187 @@
+#include <piecework/runner/record.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <piecework/core/error.hpp>
+#include <piecework/scene/scene_io.hpp>
+
+namespace piecework::runner {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct PhaseColumn {
+  const char* key;
+  double model::PhaseTimes::*member;
+};
+constexpr PhaseColumn kPhases[] = {{"local", &model::PhaseTimes::local},
+                                   {"global", &model::PhaseTimes::global},
+                                   {"refactor", &model::PhaseTimes::refactor},
+                                   {"misc", &model::PhaseTimes::misc}};
+
+void add_phase(double& sum, double value) {
+  if (value >= 0) sum = std::max(sum, 0.0) + value;
+}
+
+Json frame_json(const FrameRecord& frame) {
+  Json phases;
+  for (const auto& [key, member] : kPhases)
+    if (frame.phases.*member >= 0) phases[key] = frame.phases.*member;  // what is off has no key
+  phases["other"] = frame.other_ms();
+  return {{"frame", frame.frame},
+          {"step", frame.step},
+          {"time_s", frame.time},
+          {"steps", frame.steps},
+          {"step_ms", frame.step_ms},
+          {"phases_ms", phases},
+          {"counters",
+           {{"iterations", frame.iterations},
+            {"global_solves", frame.global_solves},
+            {"converged_steps", frame.converged_steps},
+            {"degenerate_projections", frame.degenerate_projections}}},
+          {"gradient", frame.gradient},
+          {"error_mean_edges", frame.error},
+          {"energy_j", frame.energy},
+          {"dx_unit_box", {{"norm_2", frame.dx_2}, {"rms", frame.dx_rms}, {"inf", frame.dx_inf}}}};
+}
+
+FrameRecord frame_from_json(const Json& json) {
+  FrameRecord frame;
+  frame.frame = json.at("frame");
+  frame.step = json.at("step");
+  frame.time = json.at("time_s");
+  frame.steps = json.at("steps");
+  frame.step_ms = json.at("step_ms");
+  for (const auto& [key, member] : kPhases)
+    if (json.at("phases_ms").contains(key)) frame.phases.*member = json.at("phases_ms").at(key);
+  const Json& counters = json.at("counters");
+  frame.iterations = counters.at("iterations");
+  frame.global_solves = counters.at("global_solves");
+  frame.converged_steps = counters.at("converged_steps");
+  frame.degenerate_projections = counters.at("degenerate_projections");
+  frame.gradient = json.at("gradient");
+  // JSON has no infinity: an estimate that does not exist yet is null.
+  const auto number = [](const Json& value) {
+    return value.is_null() ? std::numeric_limits<double>::infinity() : value.get<double>();
+  };
+  frame.error = number(json.at("error_mean_edges"));
+  frame.energy = json.at("energy_j");
+  frame.dx_2 = json.at("dx_unit_box").at("norm_2");
+  frame.dx_rms = json.at("dx_unit_box").at("rms");
+  frame.dx_inf = json.at("dx_unit_box").at("inf");
+  return frame;
+}
+
+Json domains_json(const World& world) {
+  const decomposition::Summary& s = world.domain_summary;
+  return {{"domains", s.domains},     {"corner", s.corner},     {"boundary", s.boundary},
+          {"remainder", s.remainder}, {"edge_cut", s.edge_cut}, {"balance", s.balance},
+          {"seed", world.domains.seed}};
+}
+
+Json scene_json(const RunRecord& record, const World& world) {
+  Json overrides = Json::object();
+  for (const auto& [key, value] : record.overrides) overrides[key] = value;
+  return {{"name", world.scene.name},
+          {"motion_hash", record.scene_hash},
+          {"overrides", overrides},
+          {"vertices", world.model.num_vertices()},
+          {"dof", 3 * world.model.num_vertices()},
+          {"triangles", world.model.triangles.size()},
+          {"bending_hinges", world.model.bend.size()},
+          {"h_s", world.scene.step.h},
+          {"mean_edge_m", world.model.mean_edge},
+          {"domains", domains_json(world)},
+          {"resolved", Json::parse(scene::resolved_json(world.scene))}};
+}
+
+}  // namespace
+
+void FrameRecord::add(const model::StepReport& report) {
+  ++steps;
+  step_ms += report.step_ms;
+  for (const auto& [key, member] : kPhases) add_phase(phases.*member, report.phases.*member);
+  iterations += report.iterations;
+  global_solves += report.global_solves;
+  converged_steps += report.converged;
+  degenerate_projections += report.degenerate_projections;
+  gradient = std::max(gradient, report.gradient);
+  error = std::max(error, report.error);
+  energy = report.energy;
+  dx_2 = report.dx_2;
+  dx_rms = report.dx_rms;
+  dx_inf = report.dx_inf;
+}
+
+void FrameRecord::finish(int frame_number, const model::State& state) {
+  frame = frame_number;
+  step = state.step;
+  time = state.time;
+  step_ms /= steps;
+  for (const auto& [key, member] : kPhases)
+    if (phases.*member >= 0) phases.*member /= steps;
+}
+
+double FrameRecord::other_ms() const {
+  double sum = 0;
+  for (const auto& [key, member] : kPhases) sum += std::max(0.0, phases.*member);
+  return step_ms - sum;
+}
+
+std::string to_json(const RunRecord& record, const World& world) {
+  Json json;
+  json["schema"] = "piecework.run/1";
+  json["environment"] = Json::parse(record.environment_json);
+  json["environment"]["load_before"] = record.load_before;
+  json["environment"]["load_after"] = record.load_after;
+  json["environment"]["threads"] = record.threads;
+  json["scene"] = scene_json(record, world);
+  json["method"] = record.method;
+  json["setup"] = {{"load_ms", world.load_ms}, {"partition_ms", world.partition_ms}, {"factor_ms", record.setup_ms}};
+  json["notes"] = world.notes;
+  json["frames"] = Json::array();
+  for (const FrameRecord& frame : record.frames) json["frames"].push_back(frame_json(frame));
+  json["expectations"] = Json::array();
+  for (const ExpectationResult& e : record.expectations)
+    json["expectations"].push_back({{"text", e.text}, {"value", e.value}, {"holds", e.holds}});
+  return json.dump(1) + "\n";
+}
+
+RecordedPart recorded_part(std::string_view text, const std::string& source, int last_step) {
+  RecordedPart part;
+  try {
+    const Json json = Json::parse(text);
+    for (const Json& frame : json.at("frames")) {
+      if (frame.at("step").get<int>() > last_step) break;
+      part.frames.push_back(frame_from_json(frame));
+    }
+    for (const Json& e : json.at("expectations"))
+      part.expectations.push_back({e.at("text"), e.at("value"), e.at("holds")});
+  } catch (const Json::exception& error) {
+    throw InputError(fmt::format("{}: not a run record of this version ({}); run with --overwrite to start anew",
+                                 source, error.what()));
+  }
+  return part;
+}
+
+std::string to_csv(const RunRecord& record) {
+  std::string csv = "frame,step,time_s,phase,ms_per_step\r\n";
+  for (const FrameRecord& frame : record.frames) {
+    const auto row = [&](const char* phase, double ms) {
+      csv += fmt::format("{},{},{:.9g},{},{:.6g}\r\n", frame.frame, frame.step, frame.time, phase, ms);
+    };
+    for (const auto& [key, member] : kPhases)
+      if (frame.phases.*member >= 0) row(key, frame.phases.*member);
+    row("other", frame.other_ms());
+    row("step", frame.step_ms);
+  }
+  return csv;
+}
+
+}  // namespace piecework::runner

@@ -1,0 +1,163 @@
+#include <piecework/runner/run.hpp>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <piecework/core/atomic_file.hpp>
+#include <piecework/core/error.hpp>
+#include <piecework/runner/checkpoint.hpp>
+
+#include "small_scene.hpp"
+
+namespace piecework::runner {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Stops after a given frame, and counts.
+class Watcher : public RunObserver {
+ public:
+  explicit Watcher(int stop_after = -1) : stop_after_(stop_after) {}
+  void started(const World&, int first_frame, int) override { first = first_frame; }
+  void frame_done(const World&, const model::State& state, int frame, const FrameRecord*) override {
+    last = frame;
+    x = state.x;
+  }
+  bool should_stop() override { return last == stop_after_; }
+  int first = -1;
+  int last = -1;
+  Positions x;
+
+ private:
+  int stop_after_;
+};
+
+RunOutcome simulate(const fs::path& directory, Watcher& watcher, RunOptions options = {}, const scene::Scene& scene = small_scene()) {
+  options.directory = directory;
+  return run(scene, options, watcher);
+}
+
+TEST(Run, WritesItsFiles) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  const RunOutcome outcome = simulate(folder.path(), watcher, {.exports = {mesh::ExportFormat::Ply, mesh::ExportFormat::Obj, mesh::ExportFormat::Vtp}});
+  EXPECT_EQ(outcome.frames_done, 8);
+  EXPECT_TRUE(outcome.expectations_hold());
+  EXPECT_EQ(outcome.record.expectations.size(), 2U);
+  for (const char* name : {"scene.resolved.json", "run.json", "timings.csv", "summary.md", "checkpoint.bin", "frame_0000.ply",
+                           "frame_0008.ply", "frame_0008.obj", "frame_0008.vtp", "state/frame_0000.bin", "state/frame_0008.bin"})
+    EXPECT_TRUE(fs::exists(folder.path() / name)) << name;
+}
+
+TEST(Run, RecordHasEverythingAndPhasesSumToTheStep) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  (void)simulate(folder.path(), watcher);
+  const auto json = nlohmann::json::parse(read_file(folder.path() / "run.json"));
+  EXPECT_EQ(json.at("schema"), "piecework.run/1");
+  EXPECT_TRUE(json.at("environment").contains("cpu"));
+  EXPECT_EQ(json.at("scene").at("dof"), 168);
+  EXPECT_EQ(json.at("scene").at("domains").at("domains"), 4);
+  ASSERT_EQ(json.at("frames").size(), 8U);
+  for (const auto& frame : json.at("frames")) {
+    double sum = 0;
+    for (const auto& [phase, ms] : frame.at("phases_ms").items()) sum += ms.get<double>();
+    EXPECT_NEAR(sum, frame.at("step_ms").get<double>(), 1e-9);
+    EXPECT_GE(frame.at("phases_ms").at("other").get<double>(), 0);
+    EXPECT_FALSE(frame.at("phases_ms").contains("refactor")) << "a phase that is off has no key";
+    EXPECT_EQ(frame.at("counters").at("iterations"), 6);
+    EXPECT_GT(frame.at("gradient").get<double>(), 0);
+  }
+}
+
+TEST(Run, ContinuedRunHasTheSameBits) {
+  const TemporaryFolder whole;
+  const TemporaryFolder broken;
+  Watcher unbroken;
+  (void)simulate(whole.path(), unbroken);
+  Watcher first(3);
+  EXPECT_TRUE(simulate(broken.path(), first).stopped);
+  EXPECT_EQ(first.last, 3);
+  Watcher second;
+  const RunOutcome outcome = simulate(broken.path(), second, {.threads = 3, .resume = true});
+  EXPECT_EQ(second.first, 3);
+  EXPECT_EQ(outcome.frames_done, 8);
+  EXPECT_TRUE(second.x == unbroken.x);
+  EXPECT_EQ(outcome.record.frames.size(), 8U);
+  // The expectation at 0.03 s was met before the break and is remembered.
+  EXPECT_EQ(outcome.record.expectations.size(), 2U);
+  for (int frame = 0; frame <= 8; ++frame)
+    EXPECT_EQ(read_file(whole.path() / "state" / (frame_name(frame) + ".bin")), read_file(broken.path() / "state" / (frame_name(frame) + ".bin"))) << frame;
+}
+
+TEST(Run, CompleteRunIsLeftAlone) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  (void)simulate(folder.path(), watcher);
+  const std::string record = read_file(folder.path() / "run.json");
+  Watcher again;
+  const RunOutcome outcome = simulate(folder.path(), again);
+  EXPECT_EQ(again.first, 8);
+  EXPECT_EQ(again.last, -1) << "no frame was simulated";
+  EXPECT_EQ(read_file(folder.path() / "run.json"), record);
+  EXPECT_TRUE(outcome.expectations_hold());
+  EXPECT_EQ(outcome.record.expectations.size(), 2U);
+}
+
+TEST(Run, OtherSceneIsRefusedUnlessOverwritten) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  (void)simulate(folder.path(), watcher, {.frames = 2});
+  const scene::Scene other = small_scene({{"materials.cotton.density", "1"}});
+  write_file_atomically(folder.path() / "notes.txt", "mine");
+  EXPECT_THROW((void)simulate(folder.path(), watcher, {}, other), InputError);
+  EXPECT_EQ(simulate(folder.path(), watcher, {.frames = 1, .overwrite = true}, other).frames_done, 1);
+  EXPECT_FALSE(fs::exists(folder.path() / "state" / "frame_0002.bin")) << "left from the old run";
+  EXPECT_EQ(read_file(folder.path() / "notes.txt"), "mine") << "not ours to delete";
+}
+
+TEST(Run, SameBitsForEveryThreadCount) {
+  const scene::Scene scene = small_scene({{"cloths.0.mesh.columns", "40"}, {"cloths.0.mesh.rows", "40"}});
+  Positions expected;
+  for (const int threads : {1, 2, 4, 8}) {
+    const TemporaryFolder folder;
+    Watcher watcher;
+    (void)simulate(folder.path(), watcher, {.threads = threads, .save_states = false}, scene);
+    if (threads == 1) expected = watcher.x;
+    EXPECT_TRUE(watcher.x == expected) << threads;
+  }
+}
+
+TEST(Run, FramesOfSeveralSteps) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  const RunOutcome outcome = simulate(folder.path(), watcher, {}, small_scene({{"step.output_every", "4"}}));
+  EXPECT_EQ(outcome.frames_done, 2);
+  EXPECT_EQ(outcome.record.frames.at(1).step, 8);
+  EXPECT_EQ(outcome.record.frames.at(1).steps, 4);
+  EXPECT_EQ(outcome.record.frames.at(1).iterations, 24);
+}
+
+TEST(Run, FailedStepKeepsWhatWasDone) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  // A load that begins in the third step and cannot be represented.
+  const scene::Scene scene = small_scene({{"cloths.0.loads", R"([{"region": {"vertices": [20]}, "force": [1e308, 0, 0], "start": 0.015}])"}});
+  EXPECT_THROW((void)simulate(folder.path(), watcher, {.checkpoint_every = 1}, scene), SimulationError);
+  const auto json = nlohmann::json::parse(read_file(folder.path() / "run.json"));
+  EXPECT_EQ(json.at("frames").size(), 2U);
+  EXPECT_EQ(read_state(folder.path() / "checkpoint.bin", motion_hash(scene), 56).step, 2);
+}
+
+TEST(Run, CheckpointWithoutItsRecordIsRefused) {
+  const TemporaryFolder folder;
+  Watcher watcher(3);
+  (void)simulate(folder.path(), watcher);
+  write_file_atomically(folder.path() / "run.json", R"({"frames": [], "expectations": []})");
+  EXPECT_THROW((void)simulate(folder.path(), watcher), InputError);
+  write_file_atomically(folder.path() / "run.json", "{");
+  EXPECT_THROW((void)simulate(folder.path(), watcher), InputError);
+}
+
+}  // namespace
+}  // namespace piecework::runner

@@ -1,0 +1,54 @@
+#pragma once
+
+// A scene made real: meshes loaded and placed, constraints built, domains cut.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <piecework/decomposition/decomposition.hpp>
+#include <piecework/mesh/triangle_mesh.hpp>
+#include <piecework/model/constraints.hpp>
+#include <piecework/model/forces.hpp>
+#include <piecework/model/integrator.hpp>
+#include <piecework/model/pins.hpp>
+#include <piecework/scene/scene.hpp>
+
+namespace piecework::runner {
+
+/// Everything that is constant during a simulation. Not copied: solvers refer to `model`.
+struct World {
+  scene::Scene scene;
+  std::vector<mesh::MeshDocument> documents;  ///< per cloth, placed; in the order of model.parts
+  model::ClothModel model;
+  std::vector<model::Pin> pins;
+  model::ExternalForces forces;
+  std::vector<Vec3> part_velocity;  ///< m/s, per cloth
+  decomposition::Decomposition domains;
+  decomposition::Summary domain_summary;
+  std::vector<std::string> notes;  ///< repairs, reduced domain counts
+  double load_ms = 0;              ///< meshes and constraints
+  double partition_ms = 0;         ///< domains
+
+  World() = default;
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  /// What the decomposition divides.
+  [[nodiscard]] decomposition::Elements elements() const;
+  /// Vertex of the model for a vertex of cloth `part` in the order of its file.
+  /// \throws InputError if it is out of range or used by no face.
+  [[nodiscard]] int vertex(std::size_t part, int file_vertex, const std::string& where) const;
+};
+
+/// Loads meshes, places cloths, resolves regions, builds constraints and domains.
+/// \throws InputError that names scene, JSON pointer and remedy.
+std::unique_ptr<World> build_world(const scene::Scene& scene);
+
+/// The mesh that a scene's `mesh` object describes, in its own coordinates.
+mesh::MeshDocument load_mesh(const scene::Mesh& mesh);
+
+/// The integrator that the scene asks for. \pre `world` outlives it.
+std::unique_ptr<model::Integrator> make_integrator(const World& world);
+
+}  // namespace piecework::runner
