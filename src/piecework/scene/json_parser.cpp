@@ -98,18 +98,22 @@ class Builder : public nlohmann::json_sax<Json> {
     return place_of(token_);
   }
 
-  bool leaf(decltype(Node::data) data) {
-    add(std::move(data));
+  template <class T>
+  bool leaf(T value) {
+    add(std::move(value));
     return true;
   }
 
-  Node& add(decltype(Node::data) data) {
+  template <class T>
+  Node& add(T value) {
     const Place place = step();
     if (++count_ > kMaxValues)
       fail(document_, place, pointer(), fmt::format("more than {} values", kMaxValues),
            "name vertices by sets or boxes instead of listing them");
     List* siblings = nullptr;
-    Node node{std::move(data), place, {}, {}};
+    Node node;
+    node.data.emplace<T>(std::move(value));
+    node.place = place;
     if (open_.empty()) return root_ = std::move(node);
     // Only the innermost open container grows, so pointers to the outer ones stay valid.
     Open& top = open_.back();
@@ -125,9 +129,10 @@ class Builder : public nlohmann::json_sax<Json> {
     return siblings->back();
   }
 
-  bool open(decltype(Node::data) data) {
+  template <class T>
+  bool open(T container) {
     const std::string here = open_.size() >= kMaxDepth ? pointer() : "";
-    Node& node = add(std::move(data));
+    Node& node = add(std::move(container));
     if (open_.size() >= kMaxDepth)
       fail(document_, node.place, here, fmt::format("nested deeper than {} levels", kMaxDepth),
            "a scene needs fewer than 10; check the brackets");
