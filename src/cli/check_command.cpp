@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
 
 #include <piecework/model/measures.hpp>
 #include <piecework/runner/expectation.hpp>
@@ -32,12 +32,24 @@ void print_features(const runner::World& world) {
   std::size_t held = 0;
   for (const auto& pin : world.pins) held += pin.vertices.size();
   fmt::print("features\n");
-  print_feature("gravity", world.forces.gravity.has_value(), world.forces.gravity ? fmt::format("{:g} m/s^2", world.forces.gravity->norm()) : "gravity is null");
-  print_feature("bending", !world.model.bend.empty(), world.model.bend.empty() ? "no material names `bending`" : fmt::format("{} hinges", world.model.bend.size()));
-  print_feature("pins", held > 0, held > 0 ? fmt::format("{} groups, {} vertices", world.pins.size(), held) : "no cloth names `pins`");
-  print_feature("loads", !world.forces.loads.empty(), world.forces.loads.empty() ? "no cloth names `loads`" : fmt::format("{} patches", world.forces.loads.size()));
-  print_feature("wind", world.forces.wind.has_value(), world.forces.wind ? fmt::format("{:g} m/s", world.forces.wind->velocity.norm()) : "the scene names no `wind`");
-  print_feature("damping", scene.damping.has_value(), scene.damping ? fmt::format("{:g} 1/s", *scene.damping) : "the scene names no `damping`");
+  print_feature("gravity", world.forces.gravity.has_value(),
+                world.forces.gravity ? fmt::format("{:g} m/s^2", world.forces.gravity->norm())
+                                     : "gravity is null");
+  print_feature("bending", !world.model.bend.empty(),
+                world.model.bend.empty() ? "no material names `bending`"
+                                         : fmt::format("{} hinges", world.model.bend.size()));
+  print_feature("pins", held > 0,
+                held > 0 ? fmt::format("{} groups, {} vertices", world.pins.size(), held)
+                         : "no cloth names `pins`");
+  print_feature("loads", !world.forces.loads.empty(),
+                world.forces.loads.empty() ? "no cloth names `loads`"
+                                           : fmt::format("{} patches", world.forces.loads.size()));
+  print_feature("wind", world.forces.wind.has_value(),
+                world.forces.wind ? fmt::format("{:g} m/s", world.forces.wind->velocity.norm())
+                                  : "the scene names no `wind`");
+  print_feature(
+      "damping", scene.damping.has_value(),
+      scene.damping ? fmt::format("{:g} 1/s", *scene.damping) : "the scene names no `damping`");
 }
 
 void print_cloths(const runner::World& world) {
@@ -47,11 +59,13 @@ void print_cloths(const runner::World& world) {
     const auto& document = world.documents[p];
     const auto x = world.model.start.middleRows(part.first_vertex, part.num_vertices);
     const Eigen::RowVector3d size = x.colwise().maxCoeff() - x.colwise().minCoeff();
-    fmt::print("  {}: {} vertices ({} in the file), {} triangles, {:.4g} x {:.4g} x {:.4g} m, {:.4g} kg\n", part.name,
-               part.num_vertices, document.num_file_vertices(), part.num_triangles, size.x(), size.y(), size.z(),
-               world.model.mass.segment(part.first_vertex, part.num_vertices).sum());
+    fmt::print(
+        "  {}: {} vertices ({} in the file), {} triangles, {:.4g} x {:.4g} x {:.4g} m, {:.4g} kg\n",
+        part.name, part.num_vertices, document.num_file_vertices(), part.num_triangles, size.x(),
+        size.y(), size.z(), world.model.mass.segment(part.first_vertex, part.num_vertices).sum());
     std::vector<std::string> sets;
-    for (const auto& [name, vertices] : document.vertex_sets) sets.push_back(fmt::format("{} ({})", name, vertices.size()));
+    for (const auto& [name, vertices] : document.vertex_sets)
+      sets.push_back(fmt::format("{} ({})", name, vertices.size()));
     fmt::print("    vertex sets: {}\n", fmt::join(sets, ", "));
   }
 }
@@ -61,10 +75,13 @@ void print_stiffness(const runner::World& world) {
   double worst = 0;
   for (const auto& [name, material] : world.scene.materials) {
     const double vertex_mass = world.model.mass.mean();
-    worst = std::max(worst, 8 * material.stretching * material.thickness * world.scene.step.h * world.scene.step.h / vertex_mass);
+    worst = std::max(worst, 8 * material.stretching * material.thickness * world.scene.step.h *
+                                world.scene.step.h / vertex_mass);
   }
   fmt::print("stiffness     8 k_s h^2 / m = {:.3g}: {}\n", worst,
-             worst < 50 ? "projective dynamics converges fast" : worst < 500 ? "some tens of iterations per step" : "vanilla projective dynamics will converge slowly");
+             worst < 50    ? "projective dynamics converges fast"
+             : worst < 500 ? "some tens of iterations per step"
+                           : "vanilla projective dynamics will converge slowly");
 }
 
 /// nnz(L) of a METIS-ordered sheet, fitted to measured factors of 20K to 1M vertices (within 3 %).
@@ -84,12 +101,19 @@ int check(const std::string& path, const std::vector<std::string>& set) {
   print_features(*world);
   for (const std::string& note : world->notes) fmt::print("note: {}\n", note);
   const std::vector<float> strain = model::triangle_strain(world->model, world->model.start);
-  fmt::print("start strain  {:.3g} (largest; 0 = at rest)\n", *std::max_element(strain.begin(), strain.end()));
-  fmt::print("steps         {} of {:g} s, {} frames\n", world->scene.step.steps, world->scene.step.h, world->scene.step.steps / world->scene.step.output_every);
+  fmt::print("start strain  {:.3g} (largest; 0 = at rest)\n",
+             *std::max_element(strain.begin(), strain.end()));
+  fmt::print("steps         {} of {:g} s, {} frames\n", world->scene.step.steps,
+             world->scene.step.h, world->scene.step.steps / world->scene.step.output_every);
   print_stiffness(*world);
-  fmt::print("domains       {} (C|B|R {}|{}|{}, edge cut {}, balance {:.3f})\n", s.domains, s.corner, s.boundary, s.remainder, s.edge_cut, s.balance);
+  fmt::print("domains       {} (C|B|R {}|{}|{}, edge cut {}, balance {:.3f})\n", s.domains,
+             s.corner, s.boundary, s.remainder, s.edge_cut, s.balance);
   const double n = world->model.num_vertices();
-  fmt::print("size          {} degrees of freedom, about {:.3g} MB for the factor, {:.3g} MB per saved state\n", 3 * world->model.num_vertices(), 8e-6 * factor_nonzeros(n, !world->model.bend.empty()), 48e-6 * n);
+  fmt::print(
+      "size          {} degrees of freedom, about {:.3g} MB for the factor, {:.3g} MB per saved "
+      "state\n",
+      3 * world->model.num_vertices(), 8e-6 * factor_nonzeros(n, !world->model.bend.empty()),
+      48e-6 * n);
   return 0;
 }
 

@@ -1,1 +1,329 @@
+// The program as a user or a script meets it: files, streams, exit codes, signals.
 
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <piecework/core/atomic_file.hpp>
+
+namespace piecework::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Result {
+  int code = -1;  ///< exit code, or 128 + signal
+  std::string out;
+  std::string err;
+};
+
+class Cli : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / fmt::format("piecework_cli_{}", ::getpid());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// Runs `piecework <arguments>`; arguments are shell words.
+  [[nodiscard]] Result call(const std::string& arguments) const {
+    const fs::path out = folder_ / "stdout";
+    const fs::path err = folder_ / "stderr";
+    const int status = std::system(fmt::format("'{}' {} >'{}' 2>'{}' </dev/null", PIECEWORK_PROGRAM,
+                                               arguments, out.string(), err.string())
+                                       .c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(out),
+            read_file(err)};
+  }
+
+  /// A sheet of `side` x `side` vertices that hangs, as a scene file.
+  [[nodiscard]] std::string scene(int side = 12, int steps = 6) const {
+    const fs::path path = folder_ / fmt::format("sheet{}_{}.json", side, steps);
+    write_file_atomically(path, fmt::format(R"({{"name": "sheet", "step": {{"steps": {}}},
+      "solver": {{"domains": 4}}, "quality": {{"stop": "iterations", "max_iterations": 5}},
+      "materials": {{"m": {{"stretching": 261, "bending": 1e-5}}}},
+      "cloths": [{{"material": "m", "mesh": {{"generator": "sheet", "columns": {}, "rows": {}}},
+                 "pins": [{{"region": {{"vertices": [0]}}}}]}}],
+      "expect": [{{"quantity": "lowest_y", "max": -0.001}}]}})",
+                                            steps, side, side));
+    return path.string();
+  }
+
+  [[nodiscard]] std::string dir(const std::string& name) const { return (folder_ / name).string(); }
+
+  fs::path folder_;
+};
+
+/// Vertices of a binary PLY of doubles, parsed without Piecework's readers.
+std::vector<double> ply_positions(const fs::path& path) {
+  const std::string content = read_file(path);
+  const std::string end = "end_header\n";
+  const auto body = content.find(end) + end.size();
+  std::istringstream header(content.substr(0, body));
+  std::size_t vertices = 0;
+  for (std::string word; header >> word;)
+    if (word == "vertex") header >> vertices;
+  EXPECT_NE(content.find("format binary_little_endian"), std::string::npos);
+  EXPECT_NE(content.find("property double x"), std::string::npos);
+  std::vector<double> positions(3 * vertices);
+  std::memcpy(positions.data(), content.data() + body, positions.size() * sizeof(double));
+  return positions;
+}
+
+TEST_F(Cli, HelpStartsWithExamplesAndVersionIsPrinted) {
+  const Result help = call("--help");
+  EXPECT_EQ(help.code, 0);
+  EXPECT_LT(help.out.find("Examples:"), help.out.find("Options:"));
+  for (const char* command :
+       {"run", "render", "partition", "check", "env", "schema", "doctor", "scenes"}) {
+    EXPECT_NE(help.out.find(command), std::string::npos) << command;
+    EXPECT_EQ(call(std::string(command) + " --help").code, 0) << command;
+  }
+  EXPECT_EQ(call("--version").out.substr(0, 9), "piecework");
+}
+
+TEST_F(Cli, WrongUsageIsExitCode2) {
+  for (const char* arguments :
+       {"", "nonsense", "run", "run x --no-such-flag", "run x --threads zero",
+        "run x --set novalue", "render x --color purple", "partition x -k 0",
+        "partition hanging_tablecloth -o x.png --size huge"}) {
+    const Result result = call(arguments);
+    EXPECT_EQ(result.code, 2) << arguments << "\n" << result.err;
+    EXPECT_FALSE(result.err.empty());
+    EXPECT_TRUE(result.out.empty());
+  }
+}
+
+TEST_F(Cli, WrongInputIsExitCode3AndNamesFileItemAndRemedy) {
+  write_file_atomically(folder_ / "typo.json", R"({"name": "x", "stpe": {}})");
+  const Result typo = call("run " + dir("typo.json") + " -o " + dir("o"));
+  EXPECT_EQ(typo.code, 3);
+  EXPECT_NE(typo.err.find("typo.json:1:"), std::string::npos) << typo.err;
+  EXPECT_NE(typo.err.find("\"step\""), std::string::npos) << typo.err;
+  EXPECT_FALSE(fs::exists(dir("o"))) << "nothing is created for a scene that cannot be read";
+
+  EXPECT_EQ(call("run hanging_tablecloht").code, 3);
+  EXPECT_NE(call("run hanging_tablecloht").err.find("hanging_tablecloth"), std::string::npos);
+  EXPECT_EQ(call("check /nowhere.json").code, 3);
+  EXPECT_EQ(call("render " + folder_.string()).code, 3);
+  write_file_atomically(folder_ / "nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
+  const Result nan = call("partition " + dir("nan.obj") + " -k 2");
+  EXPECT_EQ(nan.code, 3);
+  EXPECT_NE(nan.err.find("nan.obj"), std::string::npos) << nan.err;
+  EXPECT_EQ(call("partition " + dir("missing.obj") + " -k 2").code, 3);
+}
+
+TEST_F(Cli, UnwritableOutputIsExitCode4) {
+  write_file_atomically(folder_ / "file", "in the way");
+  const Result result = call("run " + scene() + " --no-images -o " + dir("file/sub"));
+  EXPECT_EQ(result.code, 4) << result.err;
+  EXPECT_NE(result.err.find("file/sub"), std::string::npos);
+}
+
+TEST_F(Cli, FailedExpectationIsExitCode5OnRequest) {
+  const std::string command =
+      "run " + scene() + " --no-images --set expect.0.max=-5 -o " + dir("e");
+  EXPECT_EQ(call(command).code, 0) << "not asked for";
+  const Result result = call(command + " --overwrite --expect");
+  EXPECT_EQ(result.code, 5);
+  EXPECT_NE(result.err.find("lowest_y"), std::string::npos);
+  EXPECT_EQ(call("run " + scene() + " --no-images --expect -o " + dir("good")).code, 0);
+}
+
+TEST_F(Cli, NoImagesNeedsNoOpenGl) {
+  EXPECT_EQ(call("run " + scene() + " --no-images -o " + dir("g")).code, 0);
+  EXPECT_FALSE(fs::exists(dir("g/frame_0000.png")));
+  // Where no provider works, a run with pictures says so before it simulates anything.
+  if (call("doctor").code == 6) {
+    EXPECT_EQ(call("run " + scene() + " -o " + dir("h")).code, 6);
+    EXPECT_FALSE(fs::exists(dir("h")));
+  }
+}
+
+TEST_F(Cli, RunLeavesFramesInTheOrderOfTheScene) {
+  const Result result = call("run " + scene(12, 3) +
+                             " --no-images --export ply --frames 2 --threads 2 -o " + dir("r"));
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("summary.md"), std::string::npos);
+  const std::vector<double> start = ply_positions(dir("r/frame_0000.ply"));
+  ASSERT_EQ(start.size(), 3U * 144);
+  EXPECT_EQ(start[3 * 11], 1.0) << "vertex 11 is the corner (1, 0, 0)";
+  EXPECT_EQ(start[3 * 143 + 2], 1.0);
+  const std::vector<double> end = ply_positions(dir("r/frame_0002.ply"));
+  EXPECT_EQ(end[1], 0.0) << "vertex 0 is pinned";
+  EXPECT_LT(end[3 * 143 + 1], -1e-4);
+  EXPECT_FALSE(fs::exists(dir("r/frame_0003.ply")));
+  const auto json = nlohmann::json::parse(read_file(dir("r/run.json")));
+  EXPECT_EQ(json.at("frames").size(), 2U);
+}
+
+TEST_F(Cli, ThreadsDoNotChangeABit) {
+  const std::string path = scene(40, 4);
+  for (const int threads : {1, 2, 4, 8})
+    ASSERT_EQ(call(fmt::format("run {} --no-images --export ply --threads {} -o {}", path, threads,
+                               dir(fmt::format("t{}", threads))))
+                  .code,
+              0);
+  const std::string expected = read_file(dir("t1/frame_0004.ply"));
+  for (const int threads : {2, 4, 8})
+    EXPECT_TRUE(read_file(dir(fmt::format("t{}/frame_0004.ply", threads))) == expected) << threads;
+}
+
+/// Starts `piecework run` in the background, without a shell between.
+pid_t start(const std::vector<std::string>& arguments) {
+  std::vector<char*> argv{const_cast<char*>(PIECEWORK_PROGRAM)};  // NOLINT: execv's interface
+  for (const std::string& argument : arguments)
+    argv.push_back(const_cast<char*>(argument.c_str()));  // NOLINT
+  argv.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    std::freopen("/dev/null", "w", stderr);
+    std::freopen("/dev/null", "w", stdout);
+    execv(PIECEWORK_PROGRAM, argv.data());
+    _exit(127);
+  }
+  return child;
+}
+
+bool wait_for(const fs::path& path) {
+  for (int i = 0; i < 3000 && !fs::exists(path); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  return fs::exists(path);
+}
+
+TEST_F(Cli, KilledRunResumesWithTheSameBits) {
+  const std::string path = scene(60, 40);
+  ASSERT_EQ(call("run " + path + " --no-images --export ply -o " + dir("whole")).code, 0);
+  int kills = 0;
+  for (const int until : {3, 11, 23}) {
+    const pid_t child = start({"run", path, "--no-images", "--export", "ply", "--checkpoint-every",
+                               "2", "--resume", "-o", dir("killed")});
+    ASSERT_TRUE(wait_for(fs::path(dir("killed")) / fmt::format("frame_{:04}.ply", until)));
+    kill(child, SIGKILL);
+    int status = 0;
+    waitpid(child, &status, 0);
+    kills += WIFSIGNALED(status);
+  }
+  EXPECT_GT(kills, 0) << "every run was over before it could be killed";
+  ASSERT_EQ(call("run " + path + " --no-images --export ply --resume -o " + dir("killed")).code, 0);
+  for (int frame = 0; frame <= 40; ++frame) {
+    const std::string name = fmt::format("frame_{:04}.ply", frame);
+    ASSERT_TRUE(read_file(fs::path(dir("whole")) / name) ==
+                read_file(fs::path(dir("killed")) / name))
+        << name;
+  }
+  EXPECT_EQ(nlohmann::json::parse(read_file(dir("killed/run.json"))).at("frames").size(), 40U);
+}
+
+TEST_F(Cli, InterruptStopsWithACheckpointAndExitCode130) {
+  const std::string path = scene(60, 400);
+  const pid_t child = start({"run", path, "--no-images", "-o", dir("i")});
+  ASSERT_TRUE(wait_for(dir("i/state/frame_0002.bin")));
+  kill(child, SIGINT);
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_TRUE(fs::exists(dir("i/checkpoint.bin")));
+  const auto json = nlohmann::json::parse(read_file(dir("i/run.json")));
+  EXPECT_GE(json.at("frames").size(), 2U);
+  EXPECT_LT(json.at("frames").size(), 400U);
+}
+
+TEST_F(Cli, PartitionPrintsCountsAsJson) {
+  const Result result = call("partition hanging_tablecloth -k 16 --json");
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json.at("domains"), 16);
+  EXPECT_EQ(json.at("corner").get<int>() + json.at("remainder").get<int>(), 10000);
+  EXPECT_GT(json.at("boundary").get<int>(), json.at("corner").get<int>());
+  EXPECT_GT(json.at("edge_cut").get<int>(), 0);
+  EXPECT_LT(json.at("balance").get<double>(), 1.2);
+  EXPECT_EQ(json.size(), 6U);
+}
+
+TEST_F(Cli, CheckSaysWhatIsOnAndRunsNothing) {
+  const Result result = call("check " + scene());
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("sound"), std::string::npos);
+  EXPECT_NE(result.out.find("wind         -"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("border (44)"), std::string::npos) << result.out;
+}
+
+TEST_F(Cli, SchemaEnvAndScenesAreMachineReadable) {
+  EXPECT_TRUE(nlohmann::json::parse(call("schema").out).contains("$schema"));
+  EXPECT_TRUE(nlohmann::json::parse(call("env").out).contains("compiler"));
+  const std::string scenes = call("scenes").out;
+  for (const char* name : {"hanging_tablecloth", "flag_in_wind", "trampoline", "two_sheets"})
+    EXPECT_NE(scenes.find(name), std::string::npos);
+}
+
+class CliPictures : public Cli {
+ protected:
+  void SetUp() override {
+    Cli::SetUp();
+    if (call("doctor").code != 0) GTEST_SKIP() << "no OpenGL here (libosmesa6 or EGL)";
+  }
+};
+
+TEST_F(CliPictures, RunDrawsFramesAndASheetAndRenderDrawsThemAgain) {
+  ASSERT_EQ(call("run " + scene(12, 2) + " --size 320x240 -o " + dir("p")).code, 0);
+  for (const char* name : {"frame_0000.png", "frame_0002.png", "contact_sheet.png"})
+    EXPECT_EQ(read_file(fs::path(dir("p")) / name).substr(1, 3), "PNG") << name;
+  const Result again =
+      call("render " + dir("p") + " --color strain --frames 1: -o 's_{frame}.png'");
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_TRUE(fs::exists(dir("p/s_2.png")));
+  EXPECT_FALSE(fs::exists(dir("p/s_0.png")));
+  EXPECT_EQ(call("render " + dir("p") + " --frames 2:7").code, 3);
+  EXPECT_EQ(call("render " + dir("p") + " -o one.png").code, 3);
+}
+
+TEST_F(CliPictures, PartitionAndRenderDrawMeshes) {
+  write_file_atomically(folder_ / "two.obj", "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3 4\n");
+  EXPECT_EQ(call("partition " + dir("two.obj") + " -k 2 --color dof -o " + dir("d.png")).code, 0);
+  EXPECT_EQ(
+      call("render " + dir("two.obj") + " --color shaded --size 200x200 -o " + dir("m.png")).code,
+      0);
+  EXPECT_EQ(read_file(dir("d.png")).substr(1, 3), "PNG");
+  EXPECT_EQ(read_file(dir("m.png")).substr(1, 3), "PNG");
+}
+
+TEST_F(CliPictures, NoStateLeavesNoState) {
+  ASSERT_EQ(call("run " + scene(12, 2) + " --size 160x120 --no-state -o " + dir("n")).code, 0);
+  EXPECT_TRUE(fs::exists(dir("n/frame_0002.png")));
+  EXPECT_FALSE(fs::exists(dir("n/state")));
+}
+
+/// Every scene that comes along keeps its own promises.
+class ShippedScene : public Cli, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(ShippedScene, KeepsItsExpectations) {
+  const Result result =
+      call(fmt::format("run {} --no-images --no-state --expect -o {}", GetParam(), dir("s")));
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_FALSE(nlohmann::json::parse(read_file(dir("s/run.json"))).at("expectations").empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedScene,
+                         ::testing::Values("hanging_tablecloth", "flag_in_wind", "trampoline",
+                                           "two_sheets"),
+                         [](const auto& info) { return std::string(info.param); });
+
+}  // namespace
+}  // namespace piecework::cli

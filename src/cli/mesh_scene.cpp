@@ -8,9 +8,12 @@ namespace piecework::cli {
 
 void add_mesh_options(CLI::App& app, MeshArguments& arguments) {
   app.add_option("-k,--domains", arguments.domains, "Domains [32]")->check(CLI::Range(1, 65536));
-  app.add_option("--units", arguments.units, "Metres per unit of the mesh file [1]")->check(CLI::PositiveNumber);
-  app.add_option("--up-axis", arguments.up_axis, "Axis that points up in the mesh file [y]")->check(CLI::IsMember({"x", "y", "z"}));
-  app.add_flag("--repair", arguments.repair, "Mend the mesh where that is safe, and say what was done");
+  app.add_option("--units", arguments.units, "Metres per unit of the mesh file [1]")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--up-axis", arguments.up_axis, "Axis that points up in the mesh file [y]")
+      ->check(CLI::IsMember({"x", "y", "z"}));
+  app.add_flag("--repair", arguments.repair,
+               "Mend the mesh where that is safe, and say what was done");
 }
 
 scene::Scene mesh_scene(const std::string& path, const MeshArguments& arguments) {

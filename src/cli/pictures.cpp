@@ -51,7 +51,9 @@ Extent measure(const runner::World& world, const std::vector<Shot>& shots, bool 
     const Positions x = shot.positions();
     extent.low = extent.low.cwiseMin(x.colwise().minCoeff().transpose());
     extent.high = extent.high.cwiseMax(x.colwise().maxCoeff().transpose());
-    if (strain) extent.strain = std::max(extent.strain, percentile_99(model::triangle_strain(world.model, x)));
+    if (strain)
+      extent.strain =
+          std::max(extent.strain, percentile_99(model::triangle_strain(world.model, x)));
   }
   return extent;
 }
@@ -68,7 +70,8 @@ float round_up(float value) {
 Vec3 vec(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
 render::Camera make_camera(const scene::Camera& wish, const Extent& extent, double aspect) {
-  render::Camera camera = render::frame_box(extent.low, extent.high, aspect, wish.azimuth, wish.elevation, wish.fov);
+  render::Camera camera =
+      render::frame_box(extent.low, extent.high, aspect, wish.azimuth, wish.elevation, wish.fov);
   if (wish.position) camera.eye = vec(*wish.position);
   if (wish.target) camera.target = vec(*wish.target);
   return camera;
@@ -79,7 +82,8 @@ class Encoder {
  public:
   void write(const std::filesystem::path& path, render::Image image) {
     wait();
-    pending_ = std::async(std::launch::async, [path, image = std::move(image)] { render::write_png(path, image); });
+    pending_ = std::async(std::launch::async,
+                          [path, image = std::move(image)] { render::write_png(path, image); });
   }
   void wait() {
     if (pending_.valid()) pending_.get();
@@ -104,8 +108,8 @@ void check_pictures(const PictureOptions& options) {
   const render::Renderer probe(provider(options.gl), options.width, options.height);
 }
 
-void take_pictures(const runner::World& world, const std::vector<Shot>& shots, const PictureOptions& options,
-                   Progress& progress) {
+void take_pictures(const runner::World& world, const std::vector<Shot>& shots,
+                   const PictureOptions& options, Progress& progress) {
   render::Style style;
   style.color = color_mode(options.color);
   style.borders = options.borders;
@@ -121,7 +125,8 @@ void take_pictures(const runner::World& world, const std::vector<Shot>& shots, c
   const render::Camera camera =
       make_camera(world.scene.camera, extent, static_cast<double>(options.width) / options.height);
   const auto adjacent = decomposition::adjacent_domains(world.domains, world.model.hinges);
-  const std::vector<render::Rgb> colors = render::domain_palette(world.domains.num_domains, adjacent);
+  const std::vector<render::Rgb> colors =
+      render::domain_palette(world.domains.num_domains, adjacent);
   std::vector<render::DofClass> classes;
   for (int v = 0; style.color == render::ColorMode::Dof && v < world.model.num_vertices(); ++v)
     classes.push_back(static_cast<render::DofClass>(world.domains.dof_class(v)));
@@ -132,7 +137,8 @@ void take_pictures(const runner::World& world, const std::vector<Shot>& shots, c
     const Positions x = shots[i].positions();
     std::vector<float> values;
     if (strain) values = model::triangle_strain(world.model, x);
-    style.caption = shots[i].caption.empty() ? fmt::format("t = {:.3f} s", shots[i].time) : shots[i].caption;
+    style.caption =
+        shots[i].caption.empty() ? fmt::format("t = {:.3f} s", shots[i].time) : shots[i].caption;
     render::Image image = renderer.draw({.positions = &x,
                                          .triangles = world.model.triangles,
                                          .triangle_domain = world.domains.triangle_domain,
@@ -147,21 +153,23 @@ void take_pictures(const runner::World& world, const std::vector<Shot>& shots, c
   progress.finish();
 }
 
-void write_contact_sheet(const std::vector<Shot>& shots, const std::filesystem::path& path, int count) {
+void write_contact_sheet(const std::vector<Shot>& shots, const std::filesystem::path& path,
+                         int count) {
   const int last = static_cast<int>(shots.size()) - 1;
   const int pictures = std::min(count, last + 1);
   std::vector<render::Image> images;
   std::vector<std::string> captions;
   for (int k = 0; k < pictures; ++k) {
-    const Shot& shot = shots[static_cast<std::size_t>(pictures > 1 ? k * last / (pictures - 1) : 0)];
+    const Shot& shot =
+        shots[static_cast<std::size_t>(pictures > 1 ? k * last / (pictures - 1) : 0)];
     images.push_back(render::read_png(shot.path));
     captions.push_back(fmt::format("t = {:.3f} s", shot.time));
   }
   render::write_png(path, render::contact_sheet(images, captions, std::min(4, pictures), 480));
 }
 
-std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem::path& directory, int first, int last,
-                               const std::string& pattern) {
+std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem::path& directory,
+                               int first, int last, const std::string& pattern) {
   const std::string hash = runner::motion_hash(world.scene);
   std::vector<Shot> shots;
   for (int frame = first; frame <= last; ++frame) {
@@ -169,9 +177,10 @@ std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem
     const auto positions = [&world, state, hash] {
       return runner::read_state(state, hash, world.model.num_vertices()).x;
     };
-    shots.push_back({.positions = positions,
-                     .time = frame * world.scene.step.output_every * world.scene.step.h,
-                     .path = directory / fmt::format(fmt::runtime(pattern), fmt::arg("frame", frame))});
+    shots.push_back(
+        {.positions = positions,
+         .time = frame * world.scene.step.output_every * world.scene.step.h,
+         .path = directory / fmt::format(fmt::runtime(pattern), fmt::arg("frame", frame))});
   }
   return shots;
 }

@@ -40,16 +40,17 @@ struct Shot {
 
 /// Draws all shots with one camera and one colour scale that fit all of them, and writes them.
 /// \throws BackendError without any OpenGL; OutputError.
-void take_pictures(const runner::World& world, const std::vector<Shot>& shots, const PictureOptions& options,
-                   Progress& progress);
+void take_pictures(const runner::World& world, const std::vector<Shot>& shots,
+                   const PictureOptions& options, Progress& progress);
 
 /// Up to `count` of the pictures, evenly chosen, on one sheet.
-void write_contact_sheet(const std::vector<Shot>& shots, const std::filesystem::path& path, int count = 12);
+void write_contact_sheet(const std::vector<Shot>& shots, const std::filesystem::path& path,
+                         int count = 12);
 
 /// Shots of the frames first ... last of a run directory, from its saved states.
 /// \param pattern  file name with {frame} or {frame:04}, relative to the directory
 /// \throws InputError if a state is missing.
-std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem::path& directory, int first, int last,
-                               const std::string& pattern);
+std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem::path& directory,
+                               int first, int last, const std::string& pattern);
 
 }  // namespace piecework::cli

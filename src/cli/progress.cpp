@@ -44,7 +44,8 @@ void Progress::update(int done, const std::string& detail) {
   const double rate = (done - first_) / std::max(1e-3, elapsed / 1000);
   std::string line = fmt::format("{} frame {}/{}", verb_, done, total_);
   if (done > first_) {
-    line += rate >= 1 ? fmt::format(", {:.1f} frames/s", rate) : fmt::format(", {:.1f} s/frame", 1 / rate);
+    line += rate >= 1 ? fmt::format(", {:.1f} frames/s", rate)
+                      : fmt::format(", {:.1f} s/frame", 1 / rate);
     if (done < total_) line += ", ETA " + duration((total_ - done) / rate);
   }
   if (!detail.empty()) line += "  (" + detail + ")";

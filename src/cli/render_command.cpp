@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <tuple>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <piecework/core/error.hpp>
 #include <piecework/runner/run.hpp>
@@ -52,8 +52,10 @@ int last_frame(const fs::path& directory) {
   int frame = -1;
   while (fs::exists(directory / "state" / (runner::frame_name(frame + 1) + ".bin"))) ++frame;
   if (frame < 0)
-    throw InputError(fmt::format("{}: no state/frame_0000.bin in it; name a directory that `piecework run` wrote "
-                                 "without --no-state", directory.string()));
+    throw InputError(fmt::format(
+        "{}: no state/frame_0000.bin in it; name a directory that `piecework run` wrote "
+        "without --no-state",
+        directory.string()));
   return frame;
 }
 
@@ -71,15 +73,18 @@ std::pair<int, int> frame_range(const std::string& text, int last) {
       used = 0;
     }
     if (used != part.size() || value < 0 || value > last)
-      throw InputError(fmt::format("--frames {}: \"{}\" is no frame from 0 to {}", text, part, last));
+      throw InputError(
+          fmt::format("--frames {}: \"{}\" is no frame from 0 to {}", text, part, last));
     return value;
   };
   if (colon == std::string::npos) {
     const int frame = number(text, 0);
     return {frame, frame};
   }
-  const auto range = std::pair(number(text.substr(0, colon), 0), number(text.substr(colon + 1), last));
-  if (range.first > range.second) throw InputError(fmt::format("--frames {}: the first frame comes after the last", text));
+  const auto range =
+      std::pair(number(text.substr(0, colon), 0), number(text.substr(colon + 1), last));
+  if (range.first > range.second)
+    throw InputError(fmt::format("--frames {}: the first frame comes after the last", text));
   return range;
 }
 
@@ -89,7 +94,9 @@ int render_run(const RenderArguments& arguments, const Verbosity& verbosity) {
   const auto [first, last] = frame_range(arguments.frames, last_frame(directory));
   const std::string pattern = arguments.output.empty() ? "frame_{frame:04}.png" : arguments.output;
   if (first != last && pattern.find("{frame") == std::string::npos)
-    throw InputError(fmt::format("-o {}: has no {{frame}} for {} frames; write e.g. 'frame_{{frame:04}}.png'", pattern, last - first + 1));
+    throw InputError(
+        fmt::format("-o {}: has no {{frame}} for {} frames; write e.g. 'frame_{{frame:04}}.png'",
+                    pattern, last - first + 1));
   const auto shots = shots_of_run(*world, directory, first, last, pattern);
   Progress progress("drawing", verbosity.quiet);
   take_pictures(*world, shots, options_for(world->scene, arguments), progress);
@@ -99,8 +106,11 @@ int render_run(const RenderArguments& arguments, const Verbosity& verbosity) {
 
 int render_mesh(const RenderArguments& arguments, const Verbosity& verbosity) {
   const auto world = runner::build_world(mesh_scene(arguments.input, arguments.mesh));
-  const fs::path path = arguments.output.empty() ? fs::path(arguments.input).stem().string() + ".png" : arguments.output;
-  const Shot shot{.positions = [&] { return world->model.start; }, .caption = world->scene.name, .path = path};
+  const fs::path path = arguments.output.empty()
+                            ? fs::path(arguments.input).stem().string() + ".png"
+                            : arguments.output;
+  const Shot shot{
+      .positions = [&] { return world->model.start; }, .caption = world->scene.name, .path = path};
   Progress progress("drawing", verbosity.quiet);
   take_pictures(*world, {shot}, options_for(world->scene, arguments), progress);
   fmt::print("{}\n", path.string());
@@ -113,18 +123,21 @@ void add_render(CLI::App& program, Action& action, const Verbosity& verbosity) {
   auto arguments = std::make_shared<RenderArguments>();
   CLI::App* app = program.add_subcommand("render", kExamples);
   app->add_option("input", arguments->input, "Run directory, or mesh file")->required();
-  app->add_option("-o,--output", arguments->output, "PNG file; with {frame} or {frame:04} for several frames");
+  app->add_option("-o,--output", arguments->output,
+                  "PNG file; with {frame} or {frame:04} for several frames");
   app->add_option("--frames", arguments->frames, "A:B, A: or :B [all]");
   app->add_option("--color", arguments->color, "domain, dof, strain or shaded [as the scene says]")
       ->check(CLI::IsMember({"domain", "dof", "strain", "shaded"}));
   app->add_option("--size", arguments->size, "Picture size, e.g. 1920x1080");
-  app->add_option("--gl", arguments->gl, "OpenGL provider")->check(CLI::IsMember({"auto", "osmesa", "egl"}));
+  app->add_option("--gl", arguments->gl, "OpenGL provider")
+      ->check(CLI::IsMember({"auto", "osmesa", "egl"}));
   app->add_flag("--mesh-lines", arguments->mesh_lines, "Draw every triangle's edges");
   app->add_flag("--fast", arguments->fast, "No shadows, no ambient occlusion");
   add_mesh_options(*app, arguments->mesh);
   app->callback([arguments, &action, &verbosity] {
     action = [arguments, &verbosity] {
-      return fs::is_directory(arguments->input) ? render_run(*arguments, verbosity) : render_mesh(*arguments, verbosity);
+      return fs::is_directory(arguments->input) ? render_run(*arguments, verbosity)
+                                                : render_mesh(*arguments, verbosity);
     };
   });
 }

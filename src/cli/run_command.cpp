@@ -4,8 +4,8 @@
 #include <csignal>
 #include <filesystem>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <piecework/core/error.hpp>
 #include <piecework/runner/run.hpp>
@@ -75,25 +75,32 @@ struct RunArguments {
 
 class ConsoleObserver : public runner::RunObserver {
  public:
-  explicit ConsoleObserver(const Verbosity& verbosity) : verbosity_(verbosity), progress_("simulating", verbosity.quiet) {}
+  explicit ConsoleObserver(const Verbosity& verbosity)
+      : verbosity_(verbosity), progress_("simulating", verbosity.quiet) {}
 
   void started(const runner::World& world, int first_frame, int frames) override {
     if (!verbosity_.quiet) {
       const auto& s = world.domain_summary;
-      fmt::print(stderr, "{}: {} vertices, {} triangles, {} domains (C|B|R {}|{}|{}, balance {:.3f})\n", world.scene.name,
-                 world.model.num_vertices(), world.model.triangles.size(), s.domains, s.corner, s.boundary, s.remainder, s.balance);
+      fmt::print(stderr,
+                 "{}: {} vertices, {} triangles, {} domains (C|B|R {}|{}|{}, balance {:.3f})\n",
+                 world.scene.name, world.model.num_vertices(), world.model.triangles.size(),
+                 s.domains, s.corner, s.boundary, s.remainder, s.balance);
       for (const std::string& note : world.notes) fmt::print(stderr, "note: {}\n", note);
-      if (first_frame > 0 && first_frame < frames) fmt::print(stderr, "continuing after frame {}\n", first_frame);
+      if (first_frame > 0 && first_frame < frames)
+        fmt::print(stderr, "continuing after frame {}\n", first_frame);
       if (first_frame >= frames && first_frame > 0)
-        fmt::print(stderr, "all {} frames are there already; --overwrite runs them again\n", frames);
+        fmt::print(stderr, "all {} frames are there already; --overwrite runs them again\n",
+                   frames);
     }
     progress_.start(first_frame, frames);
   }
 
-  void frame_done(const runner::World&, const model::State&, int frame, const runner::FrameRecord* record) override {
+  void frame_done(const runner::World&, const model::State&, int frame,
+                  const runner::FrameRecord* record) override {
     if (record == nullptr) return;
-    progress_.update(frame, fmt::format("{:.3g} ms/step, {:.3g} it, gradient {:.1e}", record->step_ms,
-                                        double(record->iterations) / record->steps, record->gradient));
+    progress_.update(frame,
+                     fmt::format("{:.3g} ms/step, {:.3g} it, gradient {:.1e}", record->step_ms,
+                                 double(record->iterations) / record->steps, record->gradient));
   }
 
   bool should_stop() override { return stop_signal != 0; }
@@ -106,7 +113,9 @@ class ConsoleObserver : public runner::RunObserver {
 };
 
 mesh::ExportFormat export_format(const std::string& name) {
-  return name == "obj" ? mesh::ExportFormat::Obj : name == "vtp" ? mesh::ExportFormat::Vtp : mesh::ExportFormat::Ply;
+  return name == "obj"   ? mesh::ExportFormat::Obj
+         : name == "vtp" ? mesh::ExportFormat::Vtp
+                         : mesh::ExportFormat::Ply;
 }
 
 PictureOptions pictures_for(const scene::Scene& scene, const RunArguments& arguments) {
@@ -118,9 +127,11 @@ PictureOptions pictures_for(const scene::Scene& scene, const RunArguments& argum
   return options;
 }
 
-void draw(const runner::RunOutcome& outcome, const RunArguments& arguments, const Verbosity& verbosity) {
+void draw(const runner::RunOutcome& outcome, const RunArguments& arguments,
+          const Verbosity& verbosity) {
   const std::filesystem::path directory = arguments.directory;
-  const auto shots = shots_of_run(*outcome.world, directory, 0, outcome.frames_done, "frame_{frame:04}.png");
+  const auto shots =
+      shots_of_run(*outcome.world, directory, 0, outcome.frames_done, "frame_{frame:04}.png");
   Progress progress("drawing", verbosity.quiet);
   take_pictures(*outcome.world, shots, pictures_for(outcome.world->scene, arguments), progress);
   write_contact_sheet(shots, directory / "contact_sheet.png");
@@ -136,7 +147,8 @@ int report(const runner::RunOutcome& outcome, const RunArguments& arguments) {
     return 128 + stop_signal;
   }
   fmt::print("{}\n", (std::filesystem::path(arguments.directory) / "summary.md").string());
-  return static_cast<int>(arguments.expect && !outcome.expectations_hold() ? ExitCode::CheckFailed : ExitCode::Ok);
+  return static_cast<int>(arguments.expect && !outcome.expectations_hold() ? ExitCode::CheckFailed
+                                                                           : ExitCode::Ok);
 }
 
 int run(const RunArguments& arguments, const Verbosity& verbosity) {
@@ -169,26 +181,38 @@ int run(const RunArguments& arguments, const Verbosity& verbosity) {
 void add_run(CLI::App& program, Action& action, const Verbosity& verbosity) {
   auto arguments = std::make_shared<RunArguments>();
   CLI::App* app = program.add_subcommand("run", kExamples);
-  app->add_option("scene", arguments->scene, "Scene file, or the name of a built-in scene")->required();
+  app->add_option("scene", arguments->scene, "Scene file, or the name of a built-in scene")
+      ->required();
   app->add_option("-o,--output", arguments->directory, "Directory [out/<scene name>]");
-  app->add_option("--frames", arguments->frames, "Frames to simulate [as the scene says]")->check(CLI::NonNegativeNumber);
-  app->add_option("--threads", arguments->threads, "Threads [as the scene says, else all]")->check(CLI::Range(1, 1024));
-  app->add_option("--set", arguments->set, "Override a scene key: key=value, e.g. solver.domains=16")->allow_extra_args(false);
+  app->add_option("--frames", arguments->frames, "Frames to simulate [as the scene says]")
+      ->check(CLI::NonNegativeNumber);
+  app->add_option("--threads", arguments->threads, "Threads [as the scene says, else all]")
+      ->check(CLI::Range(1, 1024));
+  app->add_option("--set", arguments->set,
+                  "Override a scene key: key=value, e.g. solver.domains=16")
+      ->allow_extra_args(false);
   app->add_flag("--no-images", arguments->no_images, "Draw nothing; needs no OpenGL");
-  app->add_flag("--no-state", arguments->no_state, "Keep no state/ files (`piecework render` needs them)");
+  app->add_flag("--no-state", arguments->no_state,
+                "Keep no state/ files (`piecework render` needs them)");
   app->add_flag("--fast-images", arguments->fast_images, "No shadows, no ambient occlusion");
   app->add_option("--color", arguments->color, "domain, dof, strain or shaded [as the scene says]")
       ->check(CLI::IsMember({"domain", "dof", "strain", "shaded"}));
   app->add_option("--size", arguments->size, "Picture size, e.g. 1920x1080 [as the scene says]");
   app->add_option("--export", arguments->exports, "Also write each frame's mesh: ply, obj or vtp")
-      ->check(CLI::IsMember({"ply", "obj", "vtp"}))->allow_extra_args(false);
-  app->add_option("--checkpoint-every", arguments->checkpoint_every, "Frames between checkpoints [at the end only]")
+      ->check(CLI::IsMember({"ply", "obj", "vtp"}))
+      ->allow_extra_args(false);
+  app->add_option("--checkpoint-every", arguments->checkpoint_every,
+                  "Frames between checkpoints [at the end only]")
       ->check(CLI::NonNegativeNumber);
   app->add_flag("--resume", arguments->resume, "Continue an interrupted run from its checkpoint");
-  app->add_flag("--overwrite", arguments->overwrite, "Replace what an earlier run left in the directory");
+  app->add_flag("--overwrite", arguments->overwrite,
+                "Replace what an earlier run left in the directory");
   app->add_flag("--expect", arguments->expect, "Exit with 5 if an expectation of the scene fails");
-  app->add_option("--gl", arguments->gl, "OpenGL provider")->check(CLI::IsMember({"auto", "osmesa", "egl"}));
-  app->callback([arguments, &action, &verbosity] { action = [arguments, &verbosity] { return run(*arguments, verbosity); }; });
+  app->add_option("--gl", arguments->gl, "OpenGL provider")
+      ->check(CLI::IsMember({"auto", "osmesa", "egl"}));
+  app->callback([arguments, &action, &verbosity] {
+    action = [arguments, &verbosity] { return run(*arguments, verbosity); };
+  });
 }
 
 }  // namespace piecework::cli

@@ -17,13 +17,14 @@ using model::StopRule;
 
 void VanillaPd::ErrorEstimate::add(double dx_inf) {
   if (last_ > 0) ratios_.push_back(dx_inf / last_);
-  if (ratios_.size() > 3) ratios_.pop_front();
+  if (ratios_.size() > kRatios) ratios_.pop_front();
   last_ = dx_inf;
 }
 
 double VanillaPd::ErrorEstimate::value() const {
   if (last_ == 0) return 0;
-  if (ratios_.empty()) return std::numeric_limits<double>::infinity();
+  // Early increments fall fast, before the slow modes are all that is left: too few ratios flatter.
+  if (ratios_.size() < kRatios) return std::numeric_limits<double>::infinity();
   const double q = std::min(0.999, *std::max_element(ratios_.begin(), ratios_.end()));
   return q / (1.0 - q) * last_;
 }

@@ -35,6 +35,7 @@ class VanillaPd final : public model::Minimizer {
     [[nodiscard]] double value() const;
 
    private:
+    static constexpr std::size_t kRatios = 3;
     double last_ = 0;
     std::deque<double> ratios_;
   };

@@ -47,7 +47,7 @@ Positions corresponding_positions(const MeshDocument& mesh, const MeshDocument& 
     throw InputError(fmt::format(
         "{}: other faces than the mesh it belongs to; both files must list the same faces",
         other_name));
-  const Positions all = file_positions(other);
+  Positions all = file_positions(other);
   if (mesh.vertex_map.empty()) return all;
   const double size = (all.colwise().maxCoeff() - all.colwise().minCoeff()).norm();
   Positions positions(mesh.mesh.num_vertices(), 3);

@@ -98,9 +98,10 @@ Content read_vtp(const std::filesystem::path& path) {
   return content;
 }
 
-/// Two quads in two groups with a split vertex column, an unused vertex first, and seams in uv.
+/// Two quads in two groups with a split vertex column, an unused vertex first and last, and seams
+/// in uv.
 const char* const kGarment =
-    "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\n"
+    "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 8 8 8\n"
     "vt 0.125 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
     "f 2/1 3/2 4/3 5/4\nf 6/1 7/2 8/3 9/4\n";
 
@@ -162,7 +163,8 @@ TEST_F(Export, FilesKeepTheUsersVerticesAndPolygons) {
     const auto path = folder_ / (std::string("out.") + extension(format));
     export_meshes(path, format, {&part, 1});
     const Content content = format == ExportFormat::Ply ? read_ply(path) : read_vtp(path);
-    ASSERT_EQ(content.vertices.size(), 9U);
+    ASSERT_EQ(content.vertices.size(), 10U);
+    EXPECT_EQ(content.vertices[9], Vec3(8, 8, 8));
     EXPECT_EQ(content.vertices[0], Vec3(9, 9, 9)) << "the unused vertex stays where it was";
     EXPECT_EQ(content.vertices[1].transpose(), x.row(0));
     EXPECT_EQ(content.vertices[2], content.vertices[5]) << "welded";
@@ -173,7 +175,7 @@ TEST_F(Export, FilesKeepTheUsersVerticesAndPolygons) {
 
 TEST_F(Export, ObjRoundTripIsExact) {
   const MeshDocument document = import_with_repair(
-      write("in.obj", std::string(kGarment) + "g tail end\nv 3 0 0\nf 7 10 8\n"));
+      write("in.obj", std::string(kGarment) + "g tail end\nv 3 0 0\nf 7 11 8\n"));
   const Positions x = document.mesh.positions / 3.0;  // no distortion: quads are cut the same way
   const ExportPart part{&document, x, "garment", {}};
   export_meshes(folder_ / "out.obj", ExportFormat::Obj, {&part, 1});
@@ -200,7 +202,7 @@ TEST_F(Export, SeveralPartsShareOneFile) {
       {&document, document.mesh.positions, "two\nlines", {}}};
   export_meshes(folder_ / "a.ply", ExportFormat::Ply, parts);
   const Content ply = read_ply(folder_ / "a.ply");
-  EXPECT_EQ(ply.vertices.size(), 18U);
+  EXPECT_EQ(ply.vertices.size(), 19U);
   ASSERT_EQ(ply.faces.size(), 10U);
   EXPECT_EQ(ply.faces[9], (std::vector<int>{14, 15, 16, 17}));
   EXPECT_TRUE(ply.domain.empty()) << "one part has no domains";

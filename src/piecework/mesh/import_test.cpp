@@ -156,6 +156,9 @@ std::vector<BadMesh> bad_meshes() {
        "edge from line 1 (vertex 0) to line 3 (vertex 2): more than two triangles on it: line 6 "
        "(face 0), line 7 (face 1) and line 8 (face 2)",
        "dropped 1 out-of-manifold", 2, 4},
+      {"three on an edge, the second turned", kSquare + "v 0 0 1\nf 1 2 3\nf 3 1 5\nf 1 3 4\n",
+       "more than two triangles on it",
+       "dropped 1 out-of-manifold triangle, first from line 7 (face 1)", 2, 4},
       {"flipped", kSquare + "f 1 2 3\nf 1 4 3\n",
        "inconsistent orientation, line 5 (face 0) and line 6 (face 1)", "turned 1 triangle", 2, 4},
       {"bow-tie", bow_tie + "f 1 2 3\nf 1 4 5\n", "line 1 (vertex 0): bow-tie",

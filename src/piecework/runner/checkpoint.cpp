@@ -28,7 +28,9 @@ struct Header {
 };
 static_assert(sizeof(Header) == 48);
 
-std::size_t state_bytes(std::int64_t vertices) { return static_cast<std::size_t>(vertices) * 6 * sizeof(double); }
+std::size_t state_bytes(std::int64_t vertices) {
+  return static_cast<std::size_t>(vertices) * 6 * sizeof(double);
+}
 
 }  // namespace
 
@@ -46,7 +48,8 @@ std::string motion_hash(const scene::Scene& scene) {
   return Hash().add(scene::resolved_json(motion)).hex();
 }
 
-void write_state(const std::filesystem::path& path, const model::State& state, const std::string& hash) {
+void write_state(const std::filesystem::path& path, const model::State& state,
+                 const std::string& hash) {
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   std::memcpy(header.hash, hash.data(), std::min(hash.size(), sizeof header.hash));
@@ -63,22 +66,28 @@ void write_state(const std::filesystem::path& path, const model::State& state, c
   write_file_atomically(path, content);
 }
 
-model::State read_state(const std::filesystem::path& path, const std::string& hash, int num_vertices) {
+model::State read_state(const std::filesystem::path& path, const std::string& hash,
+                        int num_vertices) {
   const std::string content = read_file(path);
   const auto damaged = [&](const char* what) {
-    return InputError(fmt::format("{}: {}; delete it, or run with --overwrite to start anew", path.string(), what));
+    return InputError(fmt::format("{}: {}; delete it, or run with --overwrite to start anew",
+                                  path.string(), what));
   };
   constexpr std::size_t kChecksum = 16;
   Header header{};
   if (content.size() < sizeof header + kChecksum) throw damaged("too short for a saved state");
   std::memcpy(&header, content.data(), sizeof header);
-  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0) throw damaged("not a saved state of this version");
+  if (std::memcmp(header.magic, kMagic, sizeof kMagic) != 0)
+    throw damaged("not a saved state of this version");
   if (std::string(header.hash, sizeof header.hash) != hash)
     throw damaged("belongs to another scene (its physics or mesh differ)");
-  if (header.vertices != num_vertices) throw damaged("has another number of vertices than the scene");
-  if (content.size() != sizeof header + state_bytes(header.vertices) + kChecksum) throw damaged("is truncated");
+  if (header.vertices != num_vertices)
+    throw damaged("has another number of vertices than the scene");
+  if (content.size() != sizeof header + state_bytes(header.vertices) + kChecksum)
+    throw damaged("is truncated");
   const std::string_view body(content.data(), content.size() - kChecksum);
-  if (Hash().add(body).hex() != std::string_view(content).substr(body.size())) throw damaged("its checksum is wrong");
+  if (Hash().add(body).hex() != std::string_view(content).substr(body.size()))
+    throw damaged("its checksum is wrong");
 
   model::State state;
   state.step = static_cast<int>(header.step);

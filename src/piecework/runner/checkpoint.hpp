@@ -17,11 +17,13 @@ std::string motion_hash(const scene::Scene& scene);
 
 /// Writes step, time, x and v (double, bit for bit) with the scene's motion hash and a checksum.
 /// \throws OutputError.
-void write_state(const std::filesystem::path& path, const model::State& state, const std::string& hash);
+void write_state(const std::filesystem::path& path, const model::State& state,
+                 const std::string& hash);
 
 /// Reads what write_state() wrote.
 /// \param num_vertices  the file must have as many.
 /// \throws InputError if the file is missing, damaged, or belongs to another scene.
-model::State read_state(const std::filesystem::path& path, const std::string& hash, int num_vertices);
+model::State read_state(const std::filesystem::path& path, const std::string& hash,
+                        int num_vertices);
 
 }  // namespace piecework::runner

@@ -25,7 +25,8 @@ model::State some_state() {
 class Checkpoint : public ::testing::Test {
  protected:
   [[nodiscard]] std::filesystem::path file() const { return folder_.path() / "checkpoint.bin"; }
-  void expect_refused(const std::string& fragment, const std::string& hash = kHash, int vertices = 17) const {
+  void expect_refused(const std::string& fragment, const std::string& hash = kHash,
+                      int vertices = 17) const {
     try {
       (void)read_state(file(), hash, vertices);
       ADD_FAILURE() << "accepted, but should say: " << fragment;
@@ -74,7 +75,9 @@ TEST(MotionHash, SeesPhysicsAndOnlyPhysics) {
   const std::string base = motion_hash(small_scene());
   for (const char* key : {"solver.threads", "step.steps", "step.output_every"})
     EXPECT_EQ(motion_hash(small_scene({{key, "2"}})), base) << key;
-  EXPECT_EQ(motion_hash(small_scene({{"render.color", "strain"}, {"camera.fov", "50"}, {"name", "other"}})), base);
+  EXPECT_EQ(motion_hash(
+                small_scene({{"render.color", "strain"}, {"camera.fov", "50"}, {"name", "other"}})),
+            base);
   EXPECT_NE(motion_hash(small_scene({{"step.h", "0.02"}})), base);
   EXPECT_NE(motion_hash(small_scene({{"materials.cotton.density", "0.6"}})), base);
   EXPECT_NE(motion_hash(small_scene({{"quality.max_iterations", "7"}})), base);

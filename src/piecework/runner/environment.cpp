@@ -8,8 +8,8 @@
 #include <memory>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <tbb/version.h>
+#include <nlohmann/json.hpp>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/decomposition/decomposition.hpp>
@@ -25,7 +25,8 @@ std::string proc_value(const char* path, const std::string& key) {
   for (std::string line; std::getline(file, line);) {
     if (!line.starts_with(key)) continue;
     const auto colon = line.find(':');
-    const auto begin = colon == std::string::npos ? colon : line.find_first_not_of(" \t", colon + 1);
+    const auto begin =
+        colon == std::string::npos ? colon : line.find_first_not_of(" \t", colon + 1);
     return begin == std::string::npos ? "unknown" : line.substr(begin);
   }
   return "unknown";
@@ -46,8 +47,8 @@ std::string instruction_sets(const std::string& flags) {
 std::string cores() {
   hwloc_topology_t raw = nullptr;
   if (hwloc_topology_init(&raw) != 0) return "unknown";
-  const std::unique_ptr<std::remove_pointer_t<hwloc_topology_t>, void (*)(hwloc_topology_t)> topology(
-      raw, hwloc_topology_destroy);
+  const std::unique_ptr<std::remove_pointer_t<hwloc_topology_t>, void (*)(hwloc_topology_t)>
+      topology(raw, hwloc_topology_destroy);
   if (hwloc_topology_load(topology.get()) != 0) return "unknown";
   const int count = hwloc_get_nbobjs_by_type(topology.get(), HWLOC_OBJ_CORE);
   std::string text = fmt::format("{} cores, {} usable threads", count, available_threads());
@@ -55,8 +56,10 @@ std::string cores() {
   for (int kind = 0; kinds > 1 && kind < kinds; ++kind) {
     hwloc_bitmap_t set = hwloc_bitmap_alloc();
     int efficiency = -1;
-    hwloc_cpukinds_get_info(topology.get(), static_cast<unsigned>(kind), set, &efficiency, nullptr, nullptr, 0);
-    text += fmt::format("{} {} processors of efficiency {}", kind == 0 ? ";" : ",", hwloc_bitmap_weight(set), efficiency);
+    hwloc_cpukinds_get_info(topology.get(), static_cast<unsigned>(kind), set, &efficiency, nullptr,
+                            nullptr, 0);
+    text += fmt::format("{} {} processors of efficiency {}", kind == 0 ? ";" : ",",
+                        hwloc_bitmap_weight(set), efficiency);
     hwloc_bitmap_free(set);
   }
   return text;
@@ -86,10 +89,13 @@ Environment describe_environment() {
       {"compiler", build_info::kCompiler},
       {"compiler_flags", build_info::kFlags},
       {"build_type", build_info::kBuildType},
-      {"revision", fmt::format("{}{}", build_info::kRevision, build_info::kDirty ? " (modified)" : "")},
-      {"eigen", fmt::format("Eigen {}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+      {"revision",
+       fmt::format("{}{}", build_info::kRevision, build_info::kDirty ? " (modified)" : "")},
+      {"eigen", fmt::format("Eigen {}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
+                            EIGEN_MINOR_VERSION)},
       {"global_solver", global::CholmodSolver::description()},
-      {"partitioner", fmt::format("{}, seed {}", decomposition::library_version(), decomposition::kDefaultSeed)},
+      {"partitioner",
+       fmt::format("{}, seed {}", decomposition::library_version(), decomposition::kDefaultSeed)},
       {"tasks", fmt::format("oneTBB {}", TBB_runtime_version())},
   };
 }

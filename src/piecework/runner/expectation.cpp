@@ -35,7 +35,8 @@ Eigen::Index axis_of(const std::string& quantity) { return quantity.back() - 'x'
 
 /// Force of the pins on the cloth: what holds their vertices against elasticity and weight, N.
 Vec3 reaction(const World& world, const model::State& state, Rows rows) {
-  const std::vector<char> held = model::PinScript(world.pins, world.model.start).fixed_at(state.time);
+  const std::vector<char> held =
+      model::PinScript(world.pins, world.model.start).fixed_at(state.time);
   const std::vector<char> none(held.size(), 0);
   local::JacobiStep local(world.model, 1.0);
   Positions elastic;
@@ -69,7 +70,9 @@ std::string describe(const scene::Expectation& e) {
   if (e.vertex) text += fmt::format(" of vertex {}", *e.vertex);
   if (!e.cloth.empty()) text += fmt::format(" of {}", e.cloth);
   text += e.at ? fmt::format(" at {:g} s", *e.at) : std::string(" at the end");
-  const auto bound = [](const std::optional<double>& value) { return value ? fmt::format("{:.10g}", *value) : std::string("any"); };
+  const auto bound = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.10g}", *value) : std::string("any");
+  };
   return text + fmt::format(": {} to {}", bound(e.min), bound(e.max));
 }
 
@@ -83,20 +86,25 @@ ExpectationChecker::ExpectationChecker(const World& world) : world_(world) {
     item.result.text = describe(e);
     const auto& parts = world.model.parts;
     if (!e.cloth.empty()) {
-      const auto found = std::find_if(parts.begin(), parts.end(), [&](const auto& part) { return part.name == e.cloth; });
-      if (found == parts.end()) throw InputError(fmt::format("{}/cloth: no cloth is called \"{}\"", where, e.cloth));
+      const auto found = std::find_if(parts.begin(), parts.end(),
+                                      [&](const auto& part) { return part.name == e.cloth; });
+      if (found == parts.end())
+        throw InputError(fmt::format("{}/cloth: no cloth is called \"{}\"", where, e.cloth));
       item.part = static_cast<int>(found - parts.begin());
     }
     if (e.vertex)
-      item.vertex = world.vertex(static_cast<std::size_t>(std::max(0, item.part)), *e.vertex, where + "/vertex");
+      item.vertex = world.vertex(static_cast<std::size_t>(std::max(0, item.part)), *e.vertex,
+                                 where + "/vertex");
     items_.push_back(std::move(item));
   }
 }
 
-void ExpectationChecker::observe(const model::State& state, const std::vector<FrameRecord>& frames) {
+void ExpectationChecker::observe(const model::State& state,
+                                 const std::vector<FrameRecord>& frames) {
   const double half_step = 0.5 * world_.scene.step.h;
   for (Item& item : items_)
-    if (!item.done && item.expectation->at && state.time > *item.expectation->at - half_step) evaluate(item, state, frames);
+    if (!item.done && item.expectation->at && state.time > *item.expectation->at - half_step)
+      evaluate(item, state, frames);
 }
 
 void ExpectationChecker::finish(const model::State& state, const std::vector<FrameRecord>& frames) {
@@ -120,15 +128,18 @@ void ExpectationChecker::restore(const std::vector<ExpectationResult>& results) 
     }
 }
 
-void ExpectationChecker::evaluate(Item& item, const model::State& state, const std::vector<FrameRecord>& frames) const {
+void ExpectationChecker::evaluate(Item& item, const model::State& state,
+                                  const std::vector<FrameRecord>& frames) const {
   const scene::Expectation& e = *item.expectation;
   item.done = true;
   item.result.value = measure(item, state, frames);
   const double infinity = std::numeric_limits<double>::infinity();
-  item.result.holds = item.result.value >= e.min.value_or(-infinity) && item.result.value <= e.max.value_or(infinity);
+  item.result.holds = item.result.value >= e.min.value_or(-infinity) &&
+                      item.result.value <= e.max.value_or(infinity);
 }
 
-double ExpectationChecker::measure(const Item& item, const model::State& state, const std::vector<FrameRecord>& frames) const {
+double ExpectationChecker::measure(const Item& item, const model::State& state,
+                                   const std::vector<FrameRecord>& frames) const {
   const std::string& quantity = item.expectation->quantity;
   const Rows rows = vertices_of(world_, item.part);
   const auto x = state.x.middleRows(rows.first, rows.count);

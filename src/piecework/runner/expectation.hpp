@@ -35,8 +35,10 @@ class ExpectationChecker {
     bool done = false;
     ExpectationResult result;  ///< its text is always there
   };
-  void evaluate(Item& item, const model::State& state, const std::vector<FrameRecord>& frames) const;
-  [[nodiscard]] double measure(const Item& item, const model::State& state, const std::vector<FrameRecord>& frames) const;
+  void evaluate(Item& item, const model::State& state,
+                const std::vector<FrameRecord>& frames) const;
+  [[nodiscard]] double measure(const Item& item, const model::State& state,
+                               const std::vector<FrameRecord>& frames) const;
 
   const World& world_;
   std::vector<Item> items_;

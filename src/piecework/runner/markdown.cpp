@@ -48,7 +48,8 @@ std::string median_cell(const std::vector<double>& v) {
   if (v.empty()) return kOff;
   const MedianInterval m = median_interval(v);
   if (m.count < kMinSamplesForInterval) return three_digits(m.median);
-  return fmt::format("{} [{}-{}]", three_digits(m.median), three_digits(m.low), three_digits(m.high));
+  return fmt::format("{} [{}-{}]", three_digits(m.median), three_digits(m.low),
+                     three_digits(m.high));
 }
 
 /// The columns of the paper's Table 1; what this run does not have is "-".
@@ -57,35 +58,42 @@ std::string table_one(const RunRecord& record, const World& world) {
     const auto v = values(record, [&](const FrameRecord& f) { return f.phases.*member; });
     // Per step of the run, as in the paper: a phase that ran in few steps is spread over all.
     return v.empty() ? std::string(kOff)
-                     : three_digits(std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(record.frames.size()));
+                     : three_digits(std::accumulate(v.begin(), v.end(), 0.0) /
+                                    static_cast<double>(record.frames.size()));
   };
   const std::vector<double> steps = values(record, [](const FrameRecord& f) { return f.step_ms; });
   const MedianInterval median = median_interval(steps);
   const auto& s = world.domain_summary;
-  const double iterations = mean(values(record, [](const FrameRecord& f) { return double(f.iterations) / f.steps; }));
+  const double iterations =
+      mean(values(record, [](const FrameRecord& f) { return double(f.iterations) / f.steps; }));
   std::string text =
-      "| Scene | # D | # DOF | # Elements | # C\\|B\\|R | # its | Cull | Nrw. | L | G | Ref. | SD | PCG | Misc. | Min | Max | Med | Avg |\n"
+      "| Scene | # D | # DOF | # Elements | # C\\|B\\|R | # its | Cull | Nrw. | L | G | Ref. | SD "
+      "| PCG | Misc. | Min | Max | Med | Avg |\n"
       "|:--|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
-  text += fmt::format("| {} | {} | {} | {} | {}\\|{}\\|{} | {} | - | - | {} | {} | {} | - | - | {} | {} | {} | {} | {} |\n",
-                      world.scene.name, s.domains, 3 * world.model.num_vertices(), world.model.triangles.size(),
-                      s.corner, s.boundary, s.remainder, three_digits(iterations),
-                      phase(&model::PhaseTimes::local), phase(&model::PhaseTimes::global),
-                      phase(&model::PhaseTimes::refactor), phase(&model::PhaseTimes::misc),
-                      three_digits(*std::min_element(steps.begin(), steps.end())),
-                      three_digits(*std::max_element(steps.begin(), steps.end())), three_digits(median.median),
-                      three_digits(mean(steps)));
+  text += fmt::format(
+      "| {} | {} | {} | {} | {}\\|{}\\|{} | {} | - | - | {} | {} | {} | - | - | {} | {} | {} | {} "
+      "| {} |\n",
+      world.scene.name, s.domains, 3 * world.model.num_vertices(), world.model.triangles.size(),
+      s.corner, s.boundary, s.remainder, three_digits(iterations), phase(&model::PhaseTimes::local),
+      phase(&model::PhaseTimes::global), phase(&model::PhaseTimes::refactor),
+      phase(&model::PhaseTimes::misc), three_digits(*std::min_element(steps.begin(), steps.end())),
+      three_digits(*std::max_element(steps.begin(), steps.end())), three_digits(median.median),
+      three_digits(mean(steps)));
   return text;
 }
 
 std::string phase_table(const RunRecord& record) {
   const std::vector<double> steps = values(record, [](const FrameRecord& f) { return f.step_ms; });
   const double total = std::accumulate(steps.begin(), steps.end(), 0.0);
-  std::string text = fmt::format("| Phase | ms per step, median [95 % interval] | mean | share | n |\n|:--|--:|--:|--:|--:|\n");
+  std::string text = fmt::format(
+      "| Phase | ms per step, median [95 % interval] | mean | share | n "
+      "|\n|:--|--:|--:|--:|--:|\n");
   const auto row = [&](const char* name, const Column& column) {
     const std::vector<double> v = values(record, column);
     const double sum = std::accumulate(v.begin(), v.end(), 0.0);
     const std::string share = v.empty() ? kOff : fmt::format("{:.1f} %", 100 * sum / total);
-    text += fmt::format("| {} | {} | {} | {} | {} |\n", name, median_cell(v), milliseconds(mean(v)), share, v.size());
+    text += fmt::format("| {} | {} | {} | {} | {} |\n", name, median_cell(v), milliseconds(mean(v)),
+                        share, v.size());
   };
   row("Local step (L)", [](const FrameRecord& f) { return f.phases.local; });
   row("Global step (G)", [](const FrameRecord& f) { return f.phases.global; });
@@ -103,10 +111,13 @@ std::string accuracy_table(const RunRecord& record) {
     text += fmt::format("| {} | {} | {} |\n", name, three_digits(median_interval(v).median),
                         three_digits(v.empty() ? 0 : *std::max_element(v.begin(), v.end())));
   };
-  row("Gradient (rms nodal residual / mean nodal weight)", [](const FrameRecord& f) { return f.gradient; });
+  row("Gradient (rms nodal residual / mean nodal weight)",
+      [](const FrameRecord& f) { return f.gradient; });
   row("Estimated position error (mean edge lengths)", [](const FrameRecord& f) { return f.error; });
-  row("L-G iterations per step", [](const FrameRecord& f) { return double(f.iterations) / f.steps; });
-  row("Last increment, 2-norm in the unit box (the paper's stop)", [](const FrameRecord& f) { return f.dx_2; });
+  row("L-G iterations per step",
+      [](const FrameRecord& f) { return double(f.iterations) / f.steps; });
+  row("Last increment, 2-norm in the unit box (the paper's stop)",
+      [](const FrameRecord& f) { return f.dx_2; });
   return text;
 }
 
@@ -118,17 +129,20 @@ std::string convergence_line(const RunRecord& record, const World& world) {
     total += frame.steps;
   }
   const scene::Quality& quality = world.scene.quality;
-  std::string rule = quality.stop == "iterations" ? fmt::format("{} iterations", quality.max_iterations)
-                                                  : fmt::format("`{}` <= {:g}, at most {} iterations", quality.stop,
-                                                                quality.tolerance, quality.max_iterations);
+  std::string rule = quality.stop == "iterations"
+                         ? fmt::format("{} iterations", quality.max_iterations)
+                         : fmt::format("`{}` <= {:g}, at most {} iterations", quality.stop,
+                                       quality.tolerance, quality.max_iterations);
   return fmt::format("Stop rule: {}; {} of {} steps reached it.\n", rule, converged, total);
 }
 
 std::string environment_list(const RunRecord& record) {
   std::string text;
   const auto json = nlohmann::ordered_json::parse(record.environment_json);
-  for (const auto& [key, value] : json.items()) text += fmt::format("- {}: {}\n", key, value.get<std::string>());
-  text += fmt::format("- threads: {}\n- load before and after: {:.2f}, {:.2f}\n", record.threads, record.load_before, record.load_after);
+  for (const auto& [key, value] : json.items())
+    text += fmt::format("- {}: {}\n", key, value.get<std::string>());
+  text += fmt::format("- threads: {}\n- load before and after: {:.2f}, {:.2f}\n", record.threads,
+                      record.load_before, record.load_after);
   return text;
 }
 
@@ -136,7 +150,8 @@ std::string expectation_table(const RunRecord& record) {
   if (record.expectations.empty()) return "";
   std::string text = "\n## Expectations\n\n| Expectation | found | |\n|:--|--:|:--|\n";
   for (const ExpectationResult& e : record.expectations)
-    text += fmt::format("| {} | {} | {} |\n", e.text, three_digits(e.value), e.holds ? "holds" : "**FAIL**");
+    text += fmt::format("| {} | {} | {} |\n", e.text, three_digits(e.value),
+                        e.holds ? "holds" : "**FAIL**");
   return text;
 }
 
@@ -147,14 +162,15 @@ std::string to_markdown(const RunRecord& record, const World& world) {
   if (!world.scene.description.empty()) text += world.scene.description + "\n\n";
   if (record.frames.empty()) return text + "No step was simulated.\n";
   const bool disturbed = record.load_before > 0.5 * record.threads;
-  text += fmt::format("{}, {} threads, h = {:.6g} s. Times in ms per step{}.\n\n", record.method, record.threads,
-                      world.scene.step.h, disturbed ? " †" : "");
+  text += fmt::format("{}, {} threads, h = {:.6g} s. Times in ms per step{}.\n\n", record.method,
+                      record.threads, world.scene.step.h, disturbed ? " †" : "");
   text += table_one(record, world);
   text += "\n" + phase_table(record);
   text += "\n" + accuracy_table(record);
   text += "\n" + convergence_line(record, world);
-  text += fmt::format("Set-up: load {} ms, domains {} ms, analysis and factorisation {} ms.\n", three_digits(world.load_ms),
-                      three_digits(world.partition_ms), three_digits(record.setup_ms));
+  text += fmt::format("Set-up: load {} ms, domains {} ms, analysis and factorisation {} ms.\n",
+                      three_digits(world.load_ms), three_digits(world.partition_ms),
+                      three_digits(record.setup_ms));
   if (disturbed) text += "\n† Disturbed: other work loaded the machine when the run began.\n";
   for (const std::string& note : world.notes) text += fmt::format("\nNote: {}.\n", note);
   text += expectation_table(record);

@@ -80,8 +80,8 @@ FrameRecord frame_from_json(const Json& json) {
 
 Json domains_json(const World& world) {
   const decomposition::Summary& s = world.domain_summary;
-  return {{"domains", s.domains},     {"corner", s.corner},     {"boundary", s.boundary},
-          {"remainder", s.remainder}, {"edge_cut", s.edge_cut}, {"balance", s.balance},
+  return {{"domains", s.domains},      {"corner", s.corner},     {"boundary", s.boundary},
+          {"remainder", s.remainder},  {"edge_cut", s.edge_cut}, {"balance", s.balance},
           {"seed", world.domains.seed}};
 }
 
@@ -143,7 +143,9 @@ std::string to_json(const RunRecord& record, const World& world) {
   json["environment"]["threads"] = record.threads;
   json["scene"] = scene_json(record, world);
   json["method"] = record.method;
-  json["setup"] = {{"load_ms", world.load_ms}, {"partition_ms", world.partition_ms}, {"factor_ms", record.setup_ms}};
+  json["setup"] = {{"load_ms", world.load_ms},
+                   {"partition_ms", world.partition_ms},
+                   {"factor_ms", record.setup_ms}};
   json["notes"] = world.notes;
   json["frames"] = Json::array();
   for (const FrameRecord& frame : record.frames) json["frames"].push_back(frame_json(frame));
@@ -164,8 +166,9 @@ RecordedPart recorded_part(std::string_view text, const std::string& source, int
     for (const Json& e : json.at("expectations"))
       part.expectations.push_back({e.at("text"), e.at("value"), e.at("holds")});
   } catch (const Json::exception& error) {
-    throw InputError(fmt::format("{}: not a run record of this version ({}); run with --overwrite to start anew",
-                                 source, error.what()));
+    throw InputError(
+        fmt::format("{}: not a run record of this version ({}); run with --overwrite to start anew",
+                    source, error.what()));
   }
   return part;
 }
@@ -174,7 +177,8 @@ std::string to_csv(const RunRecord& record) {
   std::string csv = "frame,step,time_s,phase,ms_per_step\r\n";
   for (const FrameRecord& frame : record.frames) {
     const auto row = [&](const char* phase, double ms) {
-      csv += fmt::format("{},{},{:.9g},{},{:.6g}\r\n", frame.frame, frame.step, frame.time, phase, ms);
+      csv +=
+          fmt::format("{},{},{:.9g},{},{:.6g}\r\n", frame.frame, frame.step, frame.time, phase, ms);
     };
     for (const auto& [key, member] : kPhases)
       if (frame.phases.*member >= 0) row(key, frame.phases.*member);

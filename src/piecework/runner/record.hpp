@@ -17,18 +17,18 @@ namespace piecework::runner {
 /// One frame: output_every steps. Times are means per step, ms; counters are sums over its steps.
 struct FrameRecord {
   int frame = 0;
-  int step = 0;        ///< steps done at its end
-  double time = 0;     ///< s
-  int steps = 0;       ///< steps in this frame
+  int step = 0;     ///< steps done at its end
+  double time = 0;  ///< s
+  int steps = 0;    ///< steps in this frame
   double step_ms = 0;
   model::PhaseTimes phases;
   int iterations = 0;
   int global_solves = 0;
   int converged_steps = 0;
   int degenerate_projections = 0;
-  double gradient = 0;  ///< largest of its steps
-  double error = 0;     ///< largest of its steps, in mean edge lengths
-  double energy = 0;    ///< of the last step, J
+  double gradient = 0;                      ///< largest of its steps
+  double error = 0;                         ///< largest of its steps, in mean edge lengths
+  double energy = 0;                        ///< of the last step, J
   double dx_2 = 0, dx_rms = 0, dx_inf = 0;  ///< of the last step
 
   void add(const model::StepReport& report);
@@ -49,9 +49,9 @@ struct RunRecord {
   std::string environment_json;  ///< from environment.hpp
   std::string scene_hash;
   std::vector<std::pair<std::string, std::string>> overrides;
-  std::string method;            ///< Minimizer::description()
+  std::string method;  ///< Minimizer::description()
   int threads = 1;
-  double setup_ms = 0;           ///< analysis and factorisation before the first step
+  double setup_ms = 0;  ///< analysis and factorisation before the first step
   std::vector<FrameRecord> frames;
   std::vector<ExpectationResult> expectations;
   double load_before = 0, load_after = 0;  ///< 1-minute load averages

@@ -20,7 +20,8 @@ RunRecord some_record(int frames, bool refactor) {
     FrameRecord frame;
     model::StepReport report;
     report.step_ms = 10.0 + i;
-    report.phases = {.local = 4.0, .global = 5.0, .refactor = (refactor && i == 2) ? 1.5 : -1.0, .misc = 0.5};
+    report.phases = {
+        .local = 4.0, .global = 5.0, .refactor = (refactor && i == 2) ? 1.5 : -1.0, .misc = 0.5};
     report.iterations = 7;
     report.converged = true;
     report.gradient = 1e-3 * i;
@@ -91,7 +92,8 @@ TEST(Record, MarkdownPrintsDashesForWhatIsOff) {
   const std::string text = to_markdown(some_record(8, false), *world);
   EXPECT_NE(text.find("| small | 4 | 168 |"), std::string::npos) << text;
   EXPECT_NE(text.find("| Refactorisation (Ref.) | - | - | - | 0 |"), std::string::npos) << text;
-  EXPECT_NE(text.find("14.5 [11.0-18.0]"), std::string::npos) << "median of 11..18 and its interval";
+  EXPECT_NE(text.find("14.5 [11.0-18.0]"), std::string::npos)
+      << "median of 11..18 and its interval";
   EXPECT_NE(text.find("8 of 8 steps reached it"), std::string::npos);
   EXPECT_EQ(text.find("nan"), std::string::npos);
   EXPECT_EQ(text.find("†"), std::string::npos);
@@ -102,7 +104,8 @@ TEST(Record, MarkdownPrintsDashesForWhatIsOff) {
 
 TEST(Record, NoFrameIsSaidNotDividedBy) {
   const auto world = build_world(small_scene());
-  EXPECT_NE(to_markdown(some_record(0, false), *world).find("No step was simulated"), std::string::npos);
+  EXPECT_NE(to_markdown(some_record(0, false), *world).find("No step was simulated"),
+            std::string::npos);
 }
 
 }  // namespace

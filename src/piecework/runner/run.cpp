@@ -23,8 +23,9 @@ constexpr const char* kRecord = "run.json";
 constexpr const char* kCheckpoint = "checkpoint.bin";
 
 bool is_run_file(const std::string& name) {
-  return name.starts_with("frame_") || name == kResolvedScene || name == kRecord || name == kCheckpoint ||
-         name == "timings.csv" || name == "summary.md" || name == "contact_sheet.png";
+  return name.starts_with("frame_") || name == kResolvedScene || name == kRecord ||
+         name == kCheckpoint || name == "timings.csv" || name == "summary.md" ||
+         name == "contact_sheet.png";
 }
 
 /// Removes what an earlier run wrote, and nothing else.
@@ -41,9 +42,10 @@ void refuse_other_scene(const fs::path& directory, const std::string& hash) {
   if (!fs::exists(path)) return;
   const scene::Scene other = scene::load_scene(path);
   if (motion_hash(other) == hash) return;
-  throw InputError(fmt::format("{}: holds a run of another scene (\"{}\" or other values); choose another "
-                               "directory with -o, or replace it with --overwrite",
-                               directory.string(), other.name));
+  throw InputError(
+      fmt::format("{}: holds a run of another scene (\"{}\" or other values); choose another "
+                  "directory with -o, or replace it with --overwrite",
+                  directory.string(), other.name));
 }
 
 /// One run in progress.
@@ -103,7 +105,8 @@ class Run {
     const fs::path checkpoint = options_.directory / kCheckpoint;
     state_ = integrator_->initial_state(world_->part_velocity);
     if (!fs::exists(checkpoint)) {
-      if (options_.resume) world_->notes.push_back("no checkpoint to resume from: started at frame 0");
+      if (options_.resume)
+        world_->notes.push_back("no checkpoint to resume from: started at frame 0");
       return;
     }
     state_ = read_state(checkpoint, record_.scene_hash, world_->model.num_vertices());
@@ -113,8 +116,9 @@ class Run {
     expectations_.restore(part.expectations);
     frame_ = record_.frames.empty() ? 0 : record_.frames.back().frame;
     if ((record_.frames.empty() ? 0 : record_.frames.back().step) != state_.step)
-      throw InputError(fmt::format("{}: does not reach the checkpoint's step {}; run with --overwrite to start anew",
-                                   path.string(), state_.step));
+      throw InputError(fmt::format(
+          "{}: does not reach the checkpoint's step {}; run with --overwrite to start anew",
+          path.string(), state_.step));
   }
 
   void simulate_frame() {
@@ -137,7 +141,8 @@ class Run {
   /// Writes the frame's files and shows it to the observer.
   void emit(const FrameRecord* frame) {
     if (options_.save_states)
-      write_state(options_.directory / "state" / (frame_name(frame_) + ".bin"), state_, record_.scene_hash);
+      write_state(options_.directory / "state" / (frame_name(frame_) + ".bin"), state_,
+                  record_.scene_hash);
     if (!options_.exports.empty()) export_frame();
     observer_.frame_done(*world_, state_, frame_, frame);
   }
@@ -153,7 +158,8 @@ class Run {
                        .triangle_domain = {first, first + range.num_triangles}});
     }
     for (const mesh::ExportFormat format : options_.exports)
-      mesh::export_meshes(options_.directory / (frame_name(frame_) + "." + mesh::extension(format)), format, parts);
+      mesh::export_meshes(options_.directory / (frame_name(frame_) + "." + mesh::extension(format)),
+                          format, parts);
   }
 
   void write_reports() {

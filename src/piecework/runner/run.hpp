@@ -33,14 +33,15 @@ class RunObserver {
   /// The scene is built; simulation starts after frame `first_frame` of `frames`.
   virtual void started(const World& world, int first_frame, int frames) = 0;
   /// A frame is complete (frame 0: the start state; record is null then).
-  virtual void frame_done(const World& world, const model::State& state, int frame, const FrameRecord* record) = 0;
+  virtual void frame_done(const World& world, const model::State& state, int frame,
+                          const FrameRecord* record) = 0;
   /// True: stop after this frame, with a checkpoint.
   virtual bool should_stop() = 0;
 };
 
 struct RunOutcome {
-  int frames_done = 0;      ///< in the directory now, frame 0 not counted
-  bool stopped = false;     ///< the observer asked for it
+  int frames_done = 0;   ///< in the directory now, frame 0 not counted
+  bool stopped = false;  ///< the observer asked for it
   RunRecord record;
   std::unique_ptr<const World> world;  ///< never null
   [[nodiscard]] bool expectations_hold() const;

@@ -32,7 +32,8 @@ class Watcher : public RunObserver {
   int stop_after_;
 };
 
-RunOutcome simulate(const fs::path& directory, Watcher& watcher, RunOptions options = {}, const scene::Scene& scene = small_scene()) {
+RunOutcome simulate(const fs::path& directory, Watcher& watcher, RunOptions options = {},
+                    const scene::Scene& scene = small_scene()) {
   options.directory = directory;
   return run(scene, options, watcher);
 }
@@ -40,12 +41,15 @@ RunOutcome simulate(const fs::path& directory, Watcher& watcher, RunOptions opti
 TEST(Run, WritesItsFiles) {
   const TemporaryFolder folder;
   Watcher watcher;
-  const RunOutcome outcome = simulate(folder.path(), watcher, {.exports = {mesh::ExportFormat::Ply, mesh::ExportFormat::Obj, mesh::ExportFormat::Vtp}});
+  const RunOutcome outcome = simulate(
+      folder.path(), watcher,
+      {.exports = {mesh::ExportFormat::Ply, mesh::ExportFormat::Obj, mesh::ExportFormat::Vtp}});
   EXPECT_EQ(outcome.frames_done, 8);
   EXPECT_TRUE(outcome.expectations_hold());
   EXPECT_EQ(outcome.record.expectations.size(), 2U);
-  for (const char* name : {"scene.resolved.json", "run.json", "timings.csv", "summary.md", "checkpoint.bin", "frame_0000.ply",
-                           "frame_0008.ply", "frame_0008.obj", "frame_0008.vtp", "state/frame_0000.bin", "state/frame_0008.bin"})
+  for (const char* name : {"scene.resolved.json", "run.json", "timings.csv", "summary.md",
+                           "checkpoint.bin", "frame_0000.ply", "frame_0008.ply", "frame_0008.obj",
+                           "frame_0008.vtp", "state/frame_0000.bin", "state/frame_0008.bin"})
     EXPECT_TRUE(fs::exists(folder.path() / name)) << name;
 }
 
@@ -87,7 +91,9 @@ TEST(Run, ContinuedRunHasTheSameBits) {
   // The expectation at 0.03 s was met before the break and is remembered.
   EXPECT_EQ(outcome.record.expectations.size(), 2U);
   for (int frame = 0; frame <= 8; ++frame)
-    EXPECT_EQ(read_file(whole.path() / "state" / (frame_name(frame) + ".bin")), read_file(broken.path() / "state" / (frame_name(frame) + ".bin"))) << frame;
+    EXPECT_EQ(read_file(whole.path() / "state" / (frame_name(frame) + ".bin")),
+              read_file(broken.path() / "state" / (frame_name(frame) + ".bin")))
+        << frame;
 }
 
 TEST(Run, CompleteRunIsLeftAlone) {
@@ -111,13 +117,15 @@ TEST(Run, OtherSceneIsRefusedUnlessOverwritten) {
   const scene::Scene other = small_scene({{"materials.cotton.density", "1"}});
   write_file_atomically(folder.path() / "notes.txt", "mine");
   EXPECT_THROW((void)simulate(folder.path(), watcher, {}, other), InputError);
-  EXPECT_EQ(simulate(folder.path(), watcher, {.frames = 1, .overwrite = true}, other).frames_done, 1);
+  EXPECT_EQ(simulate(folder.path(), watcher, {.frames = 1, .overwrite = true}, other).frames_done,
+            1);
   EXPECT_FALSE(fs::exists(folder.path() / "state" / "frame_0002.bin")) << "left from the old run";
   EXPECT_EQ(read_file(folder.path() / "notes.txt"), "mine") << "not ours to delete";
 }
 
 TEST(Run, SameBitsForEveryThreadCount) {
-  const scene::Scene scene = small_scene({{"cloths.0.mesh.columns", "40"}, {"cloths.0.mesh.rows", "40"}});
+  const scene::Scene scene =
+      small_scene({{"cloths.0.mesh.columns", "40"}, {"cloths.0.mesh.rows", "40"}});
   Positions expected;
   for (const int threads : {1, 2, 4, 8}) {
     const TemporaryFolder folder;
@@ -131,7 +139,8 @@ TEST(Run, SameBitsForEveryThreadCount) {
 TEST(Run, FramesOfSeveralSteps) {
   const TemporaryFolder folder;
   Watcher watcher;
-  const RunOutcome outcome = simulate(folder.path(), watcher, {}, small_scene({{"step.output_every", "4"}}));
+  const RunOutcome outcome =
+      simulate(folder.path(), watcher, {}, small_scene({{"step.output_every", "4"}}));
   EXPECT_EQ(outcome.frames_done, 2);
   EXPECT_EQ(outcome.record.frames.at(1).step, 8);
   EXPECT_EQ(outcome.record.frames.at(1).steps, 4);
@@ -142,8 +151,11 @@ TEST(Run, FailedStepKeepsWhatWasDone) {
   const TemporaryFolder folder;
   Watcher watcher;
   // A load that begins in the third step and cannot be represented.
-  const scene::Scene scene = small_scene({{"cloths.0.loads", R"([{"region": {"vertices": [20]}, "force": [1e308, 0, 0], "start": 0.015}])"}});
-  EXPECT_THROW((void)simulate(folder.path(), watcher, {.checkpoint_every = 1}, scene), SimulationError);
+  const scene::Scene scene = small_scene(
+      {{"cloths.0.loads",
+        R"([{"region": {"vertices": [20]}, "force": [1e308, 0, 0], "start": 0.015}])"}});
+  EXPECT_THROW((void)simulate(folder.path(), watcher, {.checkpoint_every = 1}, scene),
+               SimulationError);
   const auto json = nlohmann::json::parse(read_file(folder.path() / "run.json"));
   EXPECT_EQ(json.at("frames").size(), 2U);
   EXPECT_EQ(read_state(folder.path() / "checkpoint.bin", motion_hash(scene), 56).step, 2);

@@ -25,7 +25,8 @@ inline scene::Scene small_scene(const std::vector<scene::Override>& overrides = 
       "mesh": {"generator": "sheet", "columns": 8, "rows": 7},
       "pins": [{"region": {"vertices": [0, 7]}}]}],
     "expect": [{"quantity": "lowest_y", "at": 0.03, "max": 0}, {"quantity": "center_y", "max": -0.001}]
-  })", "small.json", overrides);
+  })",
+                            "small.json", overrides);
 }
 
 /// A folder that is removed at the end.
@@ -33,7 +34,8 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     static int count = 0;
-    path_ = std::filesystem::temp_directory_path() / fmt::format("piecework_runner_{}_{}", ::getpid(), count++);
+    path_ = std::filesystem::temp_directory_path() /
+            fmt::format("piecework_runner_{}_{}", ::getpid(), count++);
     std::filesystem::create_directories(path_);
   }
   ~TemporaryFolder() {

@@ -30,7 +30,9 @@ Enum named(const std::string& name, const Enum (&values)[N]) {
 mesh::ImportOptions import_options(const scene::Mesh& mesh) {
   mesh::ImportOptions options;
   options.unit_in_metres = mesh.units;
-  options.up_axis = mesh.up_axis == "x" ? mesh::UpAxis::X : mesh.up_axis == "z" ? mesh::UpAxis::Z : mesh::UpAxis::Y;
+  options.up_axis = mesh.up_axis == "x"   ? mesh::UpAxis::X
+                    : mesh.up_axis == "z" ? mesh::UpAxis::Z
+                                          : mesh::UpAxis::Y;
   options.repair = mesh.repair;
   options.weld = mesh.weld;
   return options;
@@ -44,22 +46,27 @@ Positions place(const Positions& positions, const scene::Cloth& cloth) {
                      Eigen::AngleAxisd(radians(cloth.rotate[0]), Vec3::UnitX()))
                         .toRotationMatrix();
   Positions placed = positions;
-  if (cloth.scale != std::array<double, 3>{1, 1, 1}) placed = placed * vec(cloth.scale).asDiagonal();
+  if (cloth.scale != std::array<double, 3>{1, 1, 1})
+    placed = placed * vec(cloth.scale).asDiagonal();
   // Untouched coordinates keep their bits.
   if (cloth.rotate != std::array<double, 3>{0, 0, 0}) placed = placed * turn.transpose();
   placed.rowwise() += vec(cloth.translate).transpose();
   return placed;
 }
 
-model::RestShape rest_shape(const scene::Cloth& cloth, const mesh::MeshDocument& document, const std::string& where) {
-  if (cloth.rest == "uv") return model::rest_from_uv(document.corner_uv, document.mesh.triangles, where);
+model::RestShape rest_shape(const scene::Cloth& cloth, const mesh::MeshDocument& document,
+                            const std::string& where) {
+  if (cloth.rest == "uv")
+    return model::rest_from_uv(document.corner_uv, document.mesh.triangles, where);
   if (cloth.rest != "file")
     return model::rest_from_positions(document.mesh.positions, document.mesh.triangles, where);
   const mesh::MeshDocument rest = mesh::import_mesh(cloth.rest_file, import_options(cloth.mesh));
-  if (rest.mesh.triangles != document.mesh.triangles || rest.mesh.num_vertices() != document.mesh.num_vertices())
-    throw InputError(fmt::format("{}/rest_file: {} has other faces than the mesh ({} and {} triangles); rest and "
-                                 "start shape need the same faces in the same order",
-                                 where, cloth.rest_file, rest.mesh.num_triangles(), document.mesh.num_triangles()));
+  if (rest.mesh.triangles != document.mesh.triangles ||
+      rest.mesh.num_vertices() != document.mesh.num_vertices())
+    throw InputError(fmt::format(
+        "{}/rest_file: {} has other faces than the mesh ({} and {} triangles); rest and "
+        "start shape need the same faces in the same order",
+        where, cloth.rest_file, rest.mesh.num_triangles(), document.mesh.num_triangles()));
   return model::rest_from_positions(rest.mesh.positions, rest.mesh.triangles, cloth.rest_file);
 }
 
@@ -71,20 +78,24 @@ bool in_box(const Vec3& x, const std::array<std::array<double, 3>, 2>& box) {
   return true;
 }
 
-const std::vector<int>& named_set(const mesh::MeshDocument& document, const std::string& name, const std::string& where) {
+const std::vector<int>& named_set(const mesh::MeshDocument& document, const std::string& name,
+                                  const std::string& where) {
   const auto found = document.vertex_sets.find(name);
   if (found != document.vertex_sets.end()) return found->second;
   std::vector<std::string> known;
   for (const auto& [set, vertices] : document.vertex_sets) known.push_back(set);
-  throw InputError(fmt::format("{}/sets: the mesh has no vertex set \"{}\"; it has: {}", where, name, fmt::join(known, ", ")));
+  throw InputError(fmt::format("{}/sets: the mesh has no vertex set \"{}\"; it has: {}", where,
+                               name, fmt::join(known, ", ")));
 }
 
 /// Model vertices of a region of one cloth, ascending.
-std::vector<int> resolve(const World& world, std::size_t part, const scene::Region& region, const std::string& where) {
+std::vector<int> resolve(const World& world, std::size_t part, const scene::Region& region,
+                         const std::string& where) {
   const mesh::MeshDocument& document = world.documents[part];
   const int first = world.model.parts[part].first_vertex;
   std::vector<int> vertices;
-  for (const int file_vertex : region.vertices) vertices.push_back(world.vertex(part, file_vertex, where + "/vertices"));
+  for (const int file_vertex : region.vertices)
+    vertices.push_back(world.vertex(part, file_vertex, where + "/vertices"));
   for (const std::string& name : region.sets)
     for (const int v : named_set(document, name, where)) vertices.push_back(first + v);
   for (int v = 0; v < world.model.parts[part].num_vertices; ++v) {
@@ -97,7 +108,9 @@ std::vector<int> resolve(const World& world, std::size_t part, const scene::Regi
   std::sort(vertices.begin(), vertices.end());
   vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
   if (vertices.empty())
-    throw InputError(fmt::format("{}: no vertex lies in this region; box and sphere are compared with start positions", where));
+    throw InputError(fmt::format(
+        "{}: no vertex lies in this region; box and sphere are compared with start positions",
+        where));
   return vertices;
 }
 
@@ -105,21 +118,23 @@ void add_pins_and_loads(World& world, std::size_t part, const std::string& where
   const scene::Cloth& cloth = world.scene.cloths[part];
   for (std::size_t i = 0; i < cloth.pins.size(); ++i) {
     const scene::Pin& pin = cloth.pins[i];
-    world.pins.push_back({.vertices = resolve(world, part, pin.region, fmt::format("{}/pins/{}/region", where, i)),
-                          .velocity = vec(pin.velocity),
-                          .axis = vec(pin.axis),
-                          .center = vec(pin.center),
-                          .rate = pin.rate,
-                          .start = pin.start,
-                          .stop = pin.stop,
-                          .release = pin.release});
+    world.pins.push_back(
+        {.vertices = resolve(world, part, pin.region, fmt::format("{}/pins/{}/region", where, i)),
+         .velocity = vec(pin.velocity),
+         .axis = vec(pin.axis),
+         .center = vec(pin.center),
+         .rate = pin.rate,
+         .start = pin.start,
+         .stop = pin.stop,
+         .release = pin.release});
   }
   for (std::size_t i = 0; i < cloth.loads.size(); ++i) {
     const scene::Load& load = cloth.loads[i];
-    world.forces.loads.push_back({.vertices = resolve(world, part, load.region, fmt::format("{}/loads/{}/region", where, i)),
-                                  .force = vec(load.force),
-                                  .start = load.start,
-                                  .stop = load.stop});
+    world.forces.loads.push_back(
+        {.vertices = resolve(world, part, load.region, fmt::format("{}/loads/{}/region", where, i)),
+         .force = vec(load.force),
+         .start = load.start,
+         .stop = load.stop});
   }
   world.part_velocity.push_back(vec(cloth.velocity));
 }
@@ -138,7 +153,8 @@ void add_fields(World& world) {
 
 model::ClothPart make_part(World& world, const scene::Cloth& cloth, const std::string& where) {
   mesh::MeshDocument document = load_mesh(cloth.mesh);
-  for (const std::string& note : document.notes) world.notes.push_back(fmt::format("{}: {}", cloth.name, note));
+  for (const std::string& note : document.notes)
+    world.notes.push_back(fmt::format("{}: {}", cloth.name, note));
   model::ClothPart part;
   part.name = cloth.name;
   part.triangles = document.mesh.triangles;
@@ -171,10 +187,13 @@ decomposition::Elements World::elements() const {
 int World::vertex(std::size_t part, int file_vertex, const std::string& where) const {
   const mesh::MeshDocument& document = documents[part];
   if (file_vertex < 0 || file_vertex >= document.num_file_vertices())
-    throw InputError(fmt::format("{}: vertex {} does not exist; the mesh has vertices 0 to {}", where, file_vertex,
-                                 document.num_file_vertices() - 1));
-  const int v = document.vertex_map.empty() ? file_vertex : document.vertex_map[static_cast<std::size_t>(file_vertex)];
-  if (v < 0) throw InputError(fmt::format("{}: no face uses vertex {}; name another", where, file_vertex));
+    throw InputError(fmt::format("{}: vertex {} does not exist; the mesh has vertices 0 to {}",
+                                 where, file_vertex, document.num_file_vertices() - 1));
+  const int v = document.vertex_map.empty()
+                    ? file_vertex
+                    : document.vertex_map[static_cast<std::size_t>(file_vertex)];
+  if (v < 0)
+    throw InputError(fmt::format("{}: no face uses vertex {}; name another", where, file_vertex));
   return model.parts[part].first_vertex + v;
 }
 
@@ -202,7 +221,8 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
   world->scene = scene;
   std::vector<model::ClothPart> parts;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
-    parts.push_back(make_part(*world, scene.cloths[i], fmt::format("{}: /cloths/{}", scene.source, i)));
+    parts.push_back(
+        make_part(*world, scene.cloths[i], fmt::format("{}: /cloths/{}", scene.source, i)));
   world->model = model::build_model(parts);
   add_fields(*world);
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
@@ -224,11 +244,11 @@ std::unique_ptr<model::Integrator> make_integrator(const World& world) {
                                 .tolerance = scene.quality.tolerance,
                                 .max_iterations = scene.quality.max_iterations,
                                 .min_iterations = scene.quality.min_iterations};
-  auto minimizer = std::make_unique<baselines::VanillaPd>(world.model, scene.step.h,
-                                                          gravity > 0 ? gravity : kStandardGravity, stop);
-  return std::make_unique<model::Integrator>(world.model, world.forces, world.pins,
-                                             model::IntegratorOptions{.h = scene.step.h, .damping = scene.damping},
-                                             std::move(minimizer));
+  auto minimizer = std::make_unique<baselines::VanillaPd>(
+      world.model, scene.step.h, gravity > 0 ? gravity : kStandardGravity, stop);
+  return std::make_unique<model::Integrator>(
+      world.model, world.forces, world.pins,
+      model::IntegratorOptions{.h = scene.step.h, .damping = scene.damping}, std::move(minimizer));
 }
 
 }  // namespace piecework::runner

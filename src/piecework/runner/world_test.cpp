@@ -14,8 +14,10 @@ namespace {
 
 /// The small scene with its only cloth's object replaced.
 scene::Scene with_cloth(const std::string& cloth) {
-  return scene::parse_scene(R"({"name": "t", "solver": {"domains": 2}, "materials": {"m": {"bending": 1e-3}}, "cloths": [)" + cloth + "]}",
-                            "t.json");
+  return scene::parse_scene(
+      R"({"name": "t", "solver": {"domains": 2}, "materials": {"m": {"bending": 1e-3}}, "cloths": [)" +
+          cloth + "]}",
+      "t.json");
 }
 
 std::string refusal(const scene::Scene& scene) {
@@ -39,7 +41,8 @@ TEST(World, BuildsWhatTheSceneSays) {
 
 TEST(World, WhatTheSceneDoesNotNameIsOff) {
   const auto world = build_world(scene::parse_scene(
-      R"({"name": "t", "gravity": null, "materials": {"m": {}}, "cloths": [{"material": "m", "mesh": {"generator": "sheet", "columns": 4, "rows": 4}}]})", "t.json"));
+      R"({"name": "t", "gravity": null, "materials": {"m": {}}, "cloths": [{"material": "m", "mesh": {"generator": "sheet", "columns": 4, "rows": 4}}]})",
+      "t.json"));
   EXPECT_FALSE(world->forces.gravity);
   EXPECT_FALSE(world->forces.wind);
   EXPECT_TRUE(world->forces.loads.empty());
@@ -58,22 +61,34 @@ TEST(World, PlacesScalesTurnsAndMoves) {
 
 TEST(World, RegionsByBoxSphereAndSet) {
   const auto pins = [](const std::string& region) {
-    const auto world = build_world(with_cloth(R"({"material": "m", "mesh": {"generator": "sheet", "columns": 5, "rows": 5}, "pins": [{"region": )" + region + "}]}"));
+    const auto world = build_world(with_cloth(
+        R"({"material": "m", "mesh": {"generator": "sheet", "columns": 5, "rows": 5}, "pins": [{"region": )" +
+        region + "}]}"));
     return world->pins.at(0).vertices;
   };
   EXPECT_EQ(pins(R"({"box": [[-1, -1, -1], [0.3, 1, 0.1]]})"), (std::vector<int>{0, 1}));
   EXPECT_EQ(pins(R"({"sphere": [1, 0, 1, 0.01]})"), (std::vector<int>{24}));
   EXPECT_EQ(pins(R"({"sets": ["border"]})").size(), 16U);
-  EXPECT_EQ(pins(R"({"vertices": [24, 0], "sphere": [1, 0, 1, 0.01]})"), (std::vector<int>{0, 24})) << "a union, each once";
+  EXPECT_EQ(pins(R"({"vertices": [24, 0], "sphere": [1, 0, 1, 0.01]})"), (std::vector<int>{0, 24}))
+      << "a union, each once";
 }
 
 TEST(World, RefusalsSayWhereAndWhatToDo) {
   const std::string mesh = R"("mesh": {"generator": "sheet", "columns": 3, "rows": 3})";
-  const auto region = [&](const std::string& text) { return refusal(with_cloth(R"({"material": "m", )" + mesh + R"(, "pins": [{"region": )" + text + "}]}")); };
-  EXPECT_NE(region(R"({"vertices": [9]})").find("/cloths/0/pins/0/region/vertices: vertex 9 does not exist; the mesh has vertices 0 to 8"), std::string::npos);
+  const auto region = [&](const std::string& text) {
+    return refusal(
+        with_cloth(R"({"material": "m", )" + mesh + R"(, "pins": [{"region": )" + text + "}]}"));
+  };
+  EXPECT_NE(region(R"({"vertices": [9]})")
+                .find("/cloths/0/pins/0/region/vertices: vertex 9 does not exist; the mesh has "
+                      "vertices 0 to 8"),
+            std::string::npos);
   EXPECT_NE(region(R"({"sets": ["hem"]})").find("\"hem\"; it has: border"), std::string::npos);
-  EXPECT_NE(region(R"({"sphere": [5, 5, 5, 0.1]})").find("no vertex lies in this region"), std::string::npos);
-  EXPECT_NE(refusal(with_cloth(R"({"material": "m", "mesh": {"file": "/nowhere/x.obj"}})")).find("/nowhere/x.obj"), std::string::npos);
+  EXPECT_NE(region(R"({"sphere": [5, 5, 5, 0.1]})").find("no vertex lies in this region"),
+            std::string::npos);
+  EXPECT_NE(refusal(with_cloth(R"({"material": "m", "mesh": {"file": "/nowhere/x.obj"}})"))
+                .find("/nowhere/x.obj"),
+            std::string::npos);
 }
 
 // A file with quads, an unused-free vertex order that is not the face order, and texture
@@ -81,10 +96,12 @@ TEST(World, RefusalsSayWhereAndWhatToDo) {
 TEST(World, FileOrderOfVerticesAndRestShapeFromTextureCoordinates) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "quad.obj";
-  write_file_atomically(path,
-                        "v 1 0 1\nv 0 0 1\nv 0 0 0\nv 1 0 0\nvt 2 2\nvt 0 2\nvt 0 0\nvt 2 0\nf 3/3 2/2 1/1 4/4\n");
+  write_file_atomically(
+      path,
+      "v 1 0 1\nv 0 0 1\nv 0 0 0\nv 1 0 0\nvt 2 2\nvt 0 2\nvt 0 0\nvt 2 0\nf 3/3 2/2 1/1 4/4\n");
   const auto cloth = [&](const std::string& rest) {
-    return R"({"material": "m", "mesh": {"file": ")" + path.string() + R"("}, "rest": ")" + rest + R"(", "pins": [{"region": {"vertices": [2]}}]})";
+    return R"({"material": "m", "mesh": {"file": ")" + path.string() + R"("}, "rest": ")" + rest +
+           R"(", "pins": [{"region": {"vertices": [2]}}]})";
   };
   const auto self = build_world(with_cloth(cloth("self")));
   const int pinned = self->pins.at(0).vertices.at(0);
@@ -102,7 +119,8 @@ TEST(World, RestShapeFromAnotherFileNeedsTheSameFaces) {
   write_file_atomically(b, "v 0 0 0\nv 3 0 0\nv 0 0 1\nf 1 3 2\n");
   write_file_atomically(c, "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\nf 1 3 2\nf 2 3 4\n");
   const auto cloth = [&](const std::filesystem::path& rest) {
-    return R"({"material": "m", "mesh": {"file": ")" + a.string() + R"("}, "rest": "file", "rest_file": ")" + rest.string() + "\"}";
+    return R"({"material": "m", "mesh": {"file": ")" + a.string() +
+           R"("}, "rest": "file", "rest_file": ")" + rest.string() + "\"}";
   };
   EXPECT_NEAR(build_world(with_cloth(cloth(b)))->model.mass.sum(), 0.5 * 1.5, 1e-12);
   EXPECT_NE(refusal(with_cloth(cloth(c))).find("has other faces"), std::string::npos);
