@@ -19,12 +19,15 @@ packages() {
 
 # missing_packages GROUP...: those of them that are not installed, on one line.
 missing_packages() {
-  local wanted installed
-  wanted=$(packages "$@" | sort)
+  local wanted installed name missing=()
+  wanted=$(packages "$@")
   # shellcheck disable=SC2086 # one word per package
   installed=$(dpkg-query -W -f='${db:Status-Abbrev} ${Package}\n' $wanted 2>/dev/null |
-    awk '$1 ~ /^.i/ { print $2 }' | sort -u) || true
-  comm -23 <(printf '%s\n' "$wanted") <(printf '%s\n' "$installed") | xargs
+    awk '$1 ~ /^.i/ { print $2 }') || true
+  for name in $wanted; do
+    grep -qxF -e "$name" <<<"$installed" || missing+=("$name")
+  done
+  printf '%s' "${missing[*]}"
 }
 
 # ensure_packages yes|no GROUP...: installs what is missing, or (no) lists it and exits 2.
@@ -64,7 +67,7 @@ install_packages() {
     fi
     [ "$try" = 2 ] || { say "Installing failed; trying once more in 5 seconds"; sleep 5; }
   done
-  tail -n 15 "$log" >&2
+  tail -n 4 "$log" >&2
   die "the packages could not be installed; the whole log is $log"
 }
 
