@@ -136,6 +136,7 @@ TEST(SceneSchema, NeverRefusesWhatTheReaderTakes) {
       if (scene[pointer].is_object()) {
         changed.push_back(scene);
         changed.back()[pointer]["unknown"] = 1;
+        EXPECT_FALSE(valid(schema(), changed.back())) << pointer;  // additionalProperties
       }
       if (!pointer.empty() && scene[pointer.parent_pointer()].is_object()) {
         changed.push_back(scene);
