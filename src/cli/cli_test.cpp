@@ -323,7 +323,7 @@ TEST_P(ShippedScene, KeepsItsExpectations) {
 INSTANTIATE_TEST_SUITE_P(All, ShippedScene,
                          ::testing::Values("hanging_tablecloth", "flag_in_wind", "trampoline",
                                            "two_sheets"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& scene) { return std::string(scene.param); });
 
 }  // namespace
 }  // namespace piecework::cli
