@@ -1,0 +1,135 @@
+// The vanilla baseline's step: time per L-G iteration split into local and global, beside the same
+// on one thread; and what it takes to get to the first step. Validation: both thread counts give
+// the same bits, and the energy is finite.
+
+#include <cmath>
+#include <fstream>
+#include <string>
+
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <piecework/baselines/vanilla_pd.hpp>
+#include <piecework/core/clock.hpp>
+#include <piecework/core/parallel.hpp>
+#include <piecework/mesh/generate.hpp>
+#include <piecework/runner/world.hpp>
+#include <piecework/testing/small_cloths.hpp>
+
+#include "bench.hpp"
+#include "interleaved.hpp"
+
+namespace piecework::bench {
+namespace {
+
+constexpr int kIterations = 5;
+constexpr double kH = 1.0 / 120.0;
+
+mesh::TriangleMesh sheet(int side) {
+  return mesh::generate(mesh::GeneratorKind::Sheet,
+                        {.columns = side, .rows = side, .pattern = mesh::SheetPattern::Delaunay})
+      .mesh;
+}
+
+void step(benchmark::State& state) {
+  const int side = static_cast<int>(state.range(0));
+  const int threads = static_cast<int>(state.range(1));
+  if (threads > available_threads()) {
+    skip(state, fmt::format("{} threads on {} cores", threads, available_threads()));
+    return;
+  }
+  const mesh::TriangleMesh mesh = sheet(side);
+  const model::ClothModel model = testing::cloth_model(mesh, testing::cotton());
+  const Positions z = mesh.positions + testing::random_positions(side * side, 0.1 / side, 1);
+  const std::vector<char> fixed(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), 0);
+  baselines::VanillaPd solver(model, kH, 9.81,
+                              {model::StopRule::Iterations, 0, kIterations, kIterations});
+  solver.prepare(fixed);
+
+  model::StepReport report;
+  double local_ms = 0;
+  double global_ms = 0;
+  const auto run = [&](int count, Positions& x) {
+    ThreadPool(count).run([&] {
+      x = z;
+      report = solver.minimize({&z, &fixed, &z}, x);
+    });
+  };
+  Positions ours;
+  Positions one_thread;
+  run(threads, ours);
+  InterleavedTimer timer;
+  for (auto _ : state) {
+    timer.sample(
+        [&] {
+          run(threads, ours);
+          local_ms += report.phases.local;
+          global_ms += report.phases.global;
+        },
+        [&] { run(1, one_thread); });
+    state.SetIterationTime(timer.last_a() / kIterations);
+  }
+  if (ours != one_thread || !std::isfinite(report.energy)) {
+    fail(state, "the thread counts disagree");
+    return;
+  }
+  timer.write(state.counters);
+  const auto solves = static_cast<double>(state.iterations()) * kIterations;
+  state.counters["vertices"] = side * side;
+  state.counters["local_ms"] = local_ms / solves;
+  state.counters["global_ms"] = global_ms / solves;
+  state.counters["gradient"] = report.gradient;
+  state.counters["nnz"] = solver.factor_report().nonzeros;
+  state.counters["factor_bytes"] = static_cast<double>(solver.factor_report().bytes);
+}
+
+/// Largest resident memory of this process so far, MB.
+double peak_megabytes() {
+  std::ifstream file("/proc/self/status");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("VmHWM:")) return std::stod(line.substr(6)) / 1024;
+  return -1;
+}
+
+/// From a scene to the end of its first L-G iteration.
+void startup(benchmark::State& state) {
+  scene::Scene scene;
+  scene.solver.domains = 32;
+  scene.quality.stop = "iterations";
+  scene.quality.max_iterations = 1;
+  scene.materials["cotton"] = {.stretching = 261, .bending = 7e-6};
+  scene::Cloth cloth{.material = "cotton"};
+  cloth.mesh.generator = "sheet";
+  cloth.mesh.pattern = "delaunay";
+  cloth.mesh.columns = cloth.mesh.rows = static_cast<int>(state.range(0));
+  cloth.pins = {{.region = {.vertices = {0, cloth.mesh.columns - 1}}}};
+  scene.cloths = {cloth};
+  for (auto _ : state) {
+    const auto world = runner::build_world(scene);
+    Stopwatch watch;
+    const auto integrator = runner::make_integrator(*world);
+    state.counters["factor_ms"] = watch.elapsed_ms();
+    model::State motion = integrator->initial_state(world->part_velocity);
+    const model::StepReport report = integrator->step(motion);
+    state.counters["load_ms"] = world->load_ms;
+    state.counters["partition_ms"] = world->partition_ms;
+    state.counters["gradient"] = report.gradient;
+  }
+  state.counters["vertices"] = static_cast<double>(state.range(0) * state.range(0));
+  state.counters["peak_mb"] = peak_megabytes();
+}
+
+const Registration registration([] {
+  auto* start = benchmark::RegisterBenchmark("startup", startup);
+  start->Unit(benchmark::kSecond)->UseRealTime()->Iterations(1)->ArgName("side");
+  for (const std::int64_t side : {141, 447})
+    if (!quick() || side == 141) start->Arg(side);
+  auto* steps = benchmark::RegisterBenchmark("step/vanilla_pd", step);
+  steps->Unit(benchmark::kMillisecond)->UseManualTime()->ArgNames({"side", "threads"});
+  for (const std::int64_t side : {141, 245, 447})
+    for (const std::int64_t threads : {1, 2, 4})
+      if (!quick() || side == 141) steps->Args({side, threads})->Iterations(quick() ? 6 : 10);
+});
+
+}  // namespace
+}  // namespace piecework::bench
