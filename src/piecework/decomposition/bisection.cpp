@@ -3,6 +3,7 @@
 #include <metis.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -111,14 +112,77 @@ void Bisector::keep_largest_part(int side) {
     if (side_[i] == side && visited_[i] != largest) side_[i] = 1 - side;
 }
 
+/// METIS may return sides in several pieces. After the second call both are connected: the second
+/// side's pieces are adjacent to the first side, which thereby stays connected.
+void Bisector::make_connected() {
+  keep_largest_part(0);
+  keep_largest_part(1);
+}
+
+/// The heavier side's weight over its target, at least 1.
+double Bisector::imbalance(double share) const {
+  double weight[2] = {0, 0};
+  for (std::size_t i = 0; i < weight_.size(); ++i) weight[side_[i]] += weight_[i];
+  const double total = weight[0] + weight[1];
+  return std::max(weight[0] / (share * total), weight[1] / ((1.0 - share) * total));
+}
+
+/// Moves triangles across the border to `side`, nearest first, until `missing` weight has come.
+void Bisector::grow(int side, double missing) {
+  std::size_t left = 0;  // on the other side
+  queue_.clear();
+  visited_.assign(weight_.size(), 0);
+  const auto reach = [&](std::size_t from) {
+    for (auto k = begin_[from]; k < begin_[from + 1]; ++k) {
+      const auto next = static_cast<std::size_t>(neighbor_[static_cast<std::size_t>(k)]);
+      if (side_[next] == side || visited_[next]) continue;
+      visited_[next] = 1;
+      queue_.push_back(static_cast<int>(next));
+    }
+  };
+  for (std::size_t i = 0; i < weight_.size(); ++i) {
+    if (side_[i] == side)
+      reach(i);
+    else
+      ++left;
+  }
+  for (std::size_t head = 0; head < queue_.size() && left > 1; ++head, --left) {
+    const auto current = static_cast<std::size_t>(queue_[head]);
+    if (0.5 * weight_[current] > missing) return;
+    side_[current] = side;
+    missing -= weight_[current];
+    reach(current);
+  }
+}
+
+/// Making sides connected can unbalance them (limbs of a body come back to the trunk). The lighter
+/// side then grows across the border; pieces that this cuts off follow. The best state is kept.
+void Bisector::rebalance(double share) {
+  constexpr double kBalanced = 1.01;
+  constexpr int kRounds = 12;
+  std::vector<std::int32_t> best = side_;
+  double best_imbalance = imbalance(share);
+  for (int round = 0; round < kRounds && best_imbalance > kBalanced; ++round) {
+    double weight[2] = {0, 0};
+    for (std::size_t i = 0; i < weight_.size(); ++i) weight[side_[i]] += weight_[i];
+    const double missing = share * (weight[0] + weight[1]) - weight[0];
+    const int light = missing > 0 ? 0 : 1;
+    grow(light, std::abs(missing));
+    keep_largest_part(1 - light);
+    if (const double now = imbalance(share); now < best_imbalance) {
+      best_imbalance = now;
+      best = side_;
+    }
+  }
+  side_ = std::move(best);
+}
+
 std::size_t Bisector::split(std::span<int> set, double share) {
   PIECEWORK_ASSERT(set.size() >= 2);
   extract(set);
   if (set.size() < kSmallSet || !split_with_metis(share)) split_by_growing(share);
-  // METIS may return parts in several pieces. After the second call both sides are connected: the
-  // second side's pieces are adjacent to the first side, which thereby stays connected.
-  keep_largest_part(0);
-  keep_largest_part(1);
+  make_connected();
+  rebalance(share);
   std::vector<int> second;
   std::size_t first_size = 0;
   for (std::size_t i = 0; i < set.size(); ++i) {

@@ -32,6 +32,10 @@ class Bisector {
   bool split_with_metis(double share);
   void split_by_growing(double share);
   void keep_largest_part(int side);
+  void make_connected();
+  void rebalance(double share);
+  void grow(int side, double missing);
+  [[nodiscard]] double imbalance(double share) const;
 
   const TriangleGraph& graph_;
   int seed_;

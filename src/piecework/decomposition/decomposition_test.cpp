@@ -1,14 +1,18 @@
 #include <piecework/decomposition/decomposition.hpp>
 
 #include <algorithm>
-#include <map>
+#include <cmath>
+#include <filesystem>
 #include <numeric>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
+#include <piecework/mesh/import.hpp>
 #include <piecework/testing/small_cloths.hpp>
 
 namespace piecework::decomposition {
@@ -190,6 +194,34 @@ TEST(Decomposition, MoreComponentsThanDomainsArePacked) {
   EXPECT_EQ(d.notes.size(), 1U);
   expect_sound(five, d);
   EXPECT_EQ(summarize(d, five.elements()).boundary, 0);
+}
+
+/// Cells of a grid that lie on one of three arms, each `width` of 1 wide: a T.
+mesh::TriangleMesh three_arms(int cells, double width) {
+  mesh::TriangleMesh mesh = testing::grid_mesh(cells + 1, cells + 1);
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    const Eigen::RowVector3d center =
+        (mesh.positions.row(t[0]) + mesh.positions.row(t[1]) + mesh.positions.row(t[2])) / 3;
+    const bool bar = center.z() < width;
+    const bool stem = std::abs(center.x() - 0.5) < 0.5 * width;
+    return !bar && !stem;
+  });
+  return mesh;
+}
+
+// METIS likes to give a side two ends of different limbs; putting them together again must not cost
+// the balance.
+TEST(Decomposition, LimbsAreConnectedAndBalanced) {
+  std::vector<Case> cases{Case(three_arms(60, 0.1)), Case(three_arms(40, 0.05))};
+  const std::string body = std::string(PIECEWORK_SHARED_DATA) + "/colliders/Armadillo_15K.ply";
+  if (std::filesystem::exists(body)) cases.emplace_back(mesh::import_mesh(body, {}).mesh);
+  for (const Case& c : cases)
+    for (const int domains : {2, 3, 4, 8, 16}) {
+      SCOPED_TRACE(domains);
+      const Decomposition d = c.decompose(domains);
+      for (int k = 0; k < domains; ++k) EXPECT_TRUE(connected(c, d, k)) << k;
+      EXPECT_LT(summarize(d, c.elements()).balance, 1.15);
+    }
 }
 
 TEST(Decomposition, IsAFunctionOfItsInputOnly) {
