@@ -76,27 +76,29 @@ class BorderFinder {
   /// Walks outwards from each border edge over vertices within reach; at least the triangles
   /// around both ends are touched, so that lines have round joints.
   void find_touched_triangles() {
-    std::vector<int> seen_triangle(mesh_.triangles.size(), -1);
-    std::vector<int> seen_vertex(mesh_.positions.size(), -1);
-    std::vector<int> todo;
+    seen_triangle_.assign(mesh_.triangles.size(), -1);
+    seen_vertex_.assign(mesh_.positions.size(), -1);
     for (std::size_t e = 0; e < result_.edges.size(); ++e) {
       const int edge = static_cast<int>(e);
-      todo.assign(result_.edges[e].begin(), result_.edges[e].end());
-      for (int v : todo) seen_vertex[v] = edge;
-      while (!todo.empty()) {
-        const int vertex = todo.back();
-        todo.pop_back();
-        for (int t : adjacency_.around(vertex)) {
-          if (seen_triangle[t] == edge) continue;
-          seen_triangle[t] = edge;
-          touches_.push_back({t, edge});
-          for (int v : mesh_.triangles[t]) {
-            if (seen_vertex[v] == edge) continue;
-            seen_vertex[v] = edge;
-            if (distance(mesh_.positions[v], result_.edges[e]) < reach_) todo.push_back(v);
-          }
-        }
+      todo_.assign(result_.edges[e].begin(), result_.edges[e].end());
+      for (int v : todo_) seen_vertex_[v] = edge;
+      while (!todo_.empty()) {
+        const int vertex = todo_.back();
+        todo_.pop_back();
+        for (int t : adjacency_.around(vertex)) touch(t, edge);
       }
+    }
+  }
+
+  /// Notes a triangle for an edge, once, and goes on to its vertices within reach.
+  void touch(int triangle, int edge) {
+    if (seen_triangle_[triangle] == edge) return;
+    seen_triangle_[triangle] = edge;
+    touches_.push_back({triangle, edge});
+    for (int v : mesh_.triangles[triangle]) {
+      if (seen_vertex_[v] == edge) continue;
+      seen_vertex_[v] = edge;
+      if (distance(mesh_.positions[v], result_.edges[edge]) < reach_) todo_.push_back(v);
     }
   }
 
@@ -123,6 +125,8 @@ class BorderFinder {
   Adjacency adjacency_;
   std::vector<std::uint8_t> mixed_;
   std::vector<Touch> touches_;
+  std::vector<int> seen_triangle_, seen_vertex_;  // the last edge that saw them
+  std::vector<int> todo_;                         // vertices to go on from
   Borders result_;
 };
 

@@ -157,7 +157,7 @@ Image contact_sheet(const std::vector<Image>& images, const std::vector<std::str
     const float width = text_width(captions[i], cap);
     const float shrink = width > room ? room / width : 1.0F;
     draw_text(sheet, captions[i], static_cast<float>(x),
-              static_cast<float>(y + tile.height) + 1.9F * cap, cap * shrink, kInk);
+              static_cast<float>(y + tile.height) + 1.9F * cap, {cap * shrink, kInk});
   }
   return sheet;
 }

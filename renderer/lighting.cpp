@@ -104,8 +104,9 @@ void fit_ground(const DisplayMesh& mesh, const LightOptions& options, GroundLigh
 }
 
 Vec3f ground_point(const GroundLight& ground, float height, std::size_t index) {
-  const Eigen::Vector2f cell((static_cast<float>(index % GroundLight::kSize) + 0.5F),
-                             (static_cast<float>(index / GroundLight::kSize) + 0.5F));
+  const std::size_t row = index / GroundLight::kSize;
+  const std::size_t column = index % GroundLight::kSize;
+  const Eigen::Vector2f cell(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F);
   const Eigen::Vector2f p =
       ground.low +
       (cell / static_cast<float>(GroundLight::kSize)).cwiseProduct(ground.high - ground.low);

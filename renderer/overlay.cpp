@@ -62,9 +62,9 @@ void draw_color_bar(const Style& style, Image& image) {
     const auto t = static_cast<float>((mark - low) / (high - low));
     const float at = y + height * (1.0F - t);
     fill_rectangle(image, x + width, at - 0.5F * line, 7.0F * u, line, kSoftInk);
-    draw_text(image, tick_label(mark, step), x + width + 16.0F * u, at + 0.5F * cap, cap, kInk);
+    draw_text(image, tick_label(mark, step), x + width + 16.0F * u, at + 0.5F * cap, {cap, kInk});
   }
-  draw_text(image, style.value_label, right, y - 1.5F * cap - 6.0F * u, cap, kInk, Align::Right);
+  draw_text(image, style.value_label, right, y - 1.5F * cap - 6.0F * u, {cap, kInk, Align::Right});
 }
 
 void draw_dot_legend(const DrawData& data, Image& image) {
@@ -92,8 +92,8 @@ void draw_dot_legend(const DrawData& data, Image& image) {
     const Rgb rim{0.5F * color.r, 0.5F * color.g, 0.5F * color.b};
     fill_disc(image, left - 24.0F * u, middle, radius + std::max(1.0F, 1.5F * u), rim);
     fill_disc(image, left - 24.0F * u, middle, radius, color);
-    draw_text(image, entry.name, left, baseline, cap, kInk);
-    draw_text(image, std::to_string(entry.count), right, baseline, cap, kSoftInk, Align::Right);
+    draw_text(image, entry.name, left, baseline, {cap, kInk});
+    draw_text(image, std::to_string(entry.count), right, baseline, {cap, kSoftInk, Align::Right});
     baseline += 2.1F * cap;
   }
 }
@@ -105,7 +105,7 @@ void draw_caption(const Style& style, Image& image) {
   float cap = text_height(image);
   const float width = text_width(style.caption, cap);
   if (width > room) cap *= std::max(room, 1.0F) / width;
-  draw_text(image, style.caption, margin, static_cast<float>(image.height) - margin, cap, kInk);
+  draw_text(image, style.caption, margin, static_cast<float>(image.height) - margin, {cap, kInk});
 }
 
 }  // namespace

@@ -32,16 +32,18 @@ bool is_pleasant(float lightness, float chroma, int hue) {
   return !(mint && chroma > 0.105F);
 }
 
+void add_hues(float lightness, float chroma, std::vector<Oklab>& colors) {
+  for (int hue = 0; hue < 360; hue += 6) {
+    const Oklab lab = oklab_from_lch(lightness, chroma, static_cast<float>(hue));
+    if (is_pleasant(lightness, chroma, hue) && in_gamut(rgb_from_oklab(lab))) colors.push_back(lab);
+  }
+}
+
 std::vector<Oklab> candidates() {
   std::vector<Oklab> result;
   for (float lightness : {0.56F, 0.62F, 0.68F, 0.74F, 0.80F, 0.86F}) {
     for (float chroma : {0.06F, 0.08F, 0.10F, 0.12F, 0.14F, 0.16F}) {
-      for (int hue = 0; hue < 360; hue += 6) {
-        const Oklab lab = oklab_from_lch(lightness, chroma, static_cast<float>(hue));
-        if (is_pleasant(lightness, chroma, hue) && in_gamut(rgb_from_oklab(lab))) {
-          result.push_back(lab);
-        }
-      }
+      add_hues(lightness, chroma, result);
     }
   }
   return result;

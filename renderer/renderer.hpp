@@ -41,7 +41,11 @@ struct Camera {
   double fov_degrees = 35;  ///< vertical
 };
 
-/// A camera that frames the box [low, high] (m) from the given direction.
+/// The nearest camera from the given direction that sees the whole box [low, high] (m), with a
+/// margin. A box without extent is framed too.
+/// \param azimuth_degrees    0 looks along -z, 90 along -x
+/// \param elevation_degrees  0 looks level, 90 straight down; clamped to -90 ... 90
+/// \throws InputError if the box is empty or a number is not finite or out of range.
 Camera frame_box(const Vec3& low, const Vec3& high, double aspect, double azimuth_degrees,
                  double elevation_degrees, double fov_degrees);
 
@@ -80,7 +84,11 @@ class Renderer {
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;
 
-  /// Draws one frame. \throws BackendError if the GL reports an error.
+  /// Draws one frame; the same arguments give the same pixels, for every number of threads. An
+  /// empty mesh leaves the background. The size of the scene does not matter.
+  /// \throws InputError if a position is not finite, a span has the wrong length, a triangle or
+  ///         domain does not exist, or camera or style are out of range; BackendError if the GL
+  ///         reports an error. The renderer stays usable.
   Image draw(const Frame& frame, const Camera& camera, const Style& style);
 
   /// "OSMesa 22.3.6 (llvmpipe ...)", for environment blocks.

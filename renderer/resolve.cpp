@@ -35,22 +35,28 @@ const std::vector<std::uint8_t>& table_for(int samples) {
   return kTables[static_cast<std::size_t>(samples - 1)];
 }
 
+/// Linear light of one channel, summed over a block of samples.
 template <int kSamples>
-void resolve_row(const std::uint8_t* top, std::size_t stride, int width, std::uint8_t* out) {
+std::uint32_t block_sum(const std::uint8_t* first, std::size_t stride) {
+  std::uint32_t sum = 0;
+  for (std::size_t j = 0; j < kSamples; ++j) {
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      const std::uint32_t value = first[j * stride + 4 * i];
+      sum += value * value;
+    }
+  }
+  return sum;
+}
+
+template <int kSamples>
+void resolve_row(const std::uint8_t* samples, std::size_t stride, int width, std::uint8_t* out) {
   const std::uint8_t* table = table_for(kSamples).data();
   constexpr std::uint32_t kShift = shift_for(kSamples);
   for (int x = 0; x < width; ++x) {
-    std::array<std::uint32_t, 3> sum{};
-    for (int j = 0; j < kSamples; ++j) {
-      const std::uint8_t* s = top + j * stride + static_cast<std::size_t>(4 * kSamples * x);
-      for (int i = 0; i < kSamples; ++i) {
-        for (std::size_t c = 0; c < 3; ++c) {
-          const std::uint32_t value = s[4 * i + static_cast<int>(c)];
-          sum[c] += value * value;
-        }
-      }
+    for (std::size_t c = 0; c < 3; ++c) {
+      *out++ = table[block_sum<kSamples>(samples + c, stride) >> kShift];
     }
-    for (std::size_t c = 0; c < 3; ++c) out[3 * x + static_cast<int>(c)] = table[sum[c] >> kShift];
+    samples += static_cast<std::size_t>(4 * kSamples);
   }
 }
 

@@ -167,7 +167,16 @@ Box pixel_box(const Image& image, float x0, float y0, float x1, float y1) {
           std::min(limit(std::ceil(y1), image.height), image.height - 1)};
 }
 
-void draw_glyph(Image& image, std::vector<Segment> segments, float half_stroke, const Rgb& color) {
+/// From the font's grid to pixels.
+std::vector<Segment> place(std::vector<Segment> segments, float x, float baseline, float scale) {
+  for (Segment& s : segments) {
+    s = {x + scale * s.x0, baseline - scale * s.y0, x + scale * s.x1, baseline - scale * s.y1};
+  }
+  return segments;
+}
+
+void draw_glyph(Image& image, const std::vector<Segment>& segments, float half_stroke,
+                const Rgb& color) {
   if (segments.empty()) return;
   float x0 = segments.front().x0;
   float x1 = x0;
@@ -199,20 +208,16 @@ float text_width(std::string_view text, float cap_height) {
   return grid_width(text) * cap_height / kCapHeight;
 }
 
-void draw_text(Image& image, std::string_view text, float x, float baseline, float cap_height,
-               const Rgb& color, Align align) {
-  const float scale = cap_height / kCapHeight;
+void draw_text(Image& image, std::string_view text, float x, float baseline,
+               const TextStyle& style) {
+  const float scale = style.cap_height / kCapHeight;
   const float half_stroke = 0.5F * std::max(kStroke * scale, kMinStroke);
-  if (align != Align::Left) {
-    x -= text_width(text, cap_height) * (align == Align::Centre ? 0.5F : 1.0F);
-  }
+  if (style.align == Align::Centre) x -= 0.5F * text_width(text, style.cap_height);
+  if (style.align == Align::Right) x -= text_width(text, style.cap_height);
   while (!text.empty()) {
     const Metrics metrics = metrics_of(next_code_point(text));
-    std::vector<Segment> segments = StrokeReader(metrics.strokes).read();
-    for (Segment& s : segments) {
-      s = {x + scale * s.x0, baseline - scale * s.y0, x + scale * s.x1, baseline - scale * s.y1};
-    }
-    draw_glyph(image, std::move(segments), half_stroke, color);
+    draw_glyph(image, place(StrokeReader(metrics.strokes).read(), x, baseline, scale), half_stroke,
+               style.color);
     x += scale * (metrics.width + kSpacing);
   }
 }

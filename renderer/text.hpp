@@ -14,11 +14,17 @@ enum class Align { Left, Centre, Right };
 /// Width in pixels of UTF-8 text whose capital letters are `cap_height` pixels high.
 float text_width(std::string_view text, float cap_height);
 
+struct TextStyle {
+  float cap_height = 16;  ///< pixels
+  Rgb color;
+  Align align = Align::Left;
+};
+
 /// Draws one line, anti-aliased; what lies outside of the image is cut off. Characters that the
 /// font lacks are drawn as a small box.
-/// \param x, baseline  pixels from the top left corner of the image; x as `align` says
-void draw_text(Image& image, std::string_view text, float x, float baseline, float cap_height,
-               const Rgb& color, Align align = Align::Left);
+/// \param x, baseline  pixels from the top left corner of the image; x as `style.align` says
+void draw_text(Image& image, std::string_view text, float x, float baseline,
+               const TextStyle& style);
 
 /// Fills an axis-parallel rectangle given in (fractional) pixels.
 void fill_rectangle(Image& image, float x, float y, float width, float height, const Rgb& color);

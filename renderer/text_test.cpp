@@ -33,7 +33,7 @@ TEST(Text, EveryPrintableCharacterHasAGlyphOfItsOwn) {
   for (char32_t code = 33; code < 127; ++code) {
     ASSERT_NE(find_glyph(code), nullptr) << static_cast<int>(code);
     Image image = paper(40, 50);
-    draw_text(image, std::string(1, static_cast<char>(code)), 8, 36, 24, {0, 0, 0});
+    draw_text(image, std::string(1, static_cast<char>(code)), 8, 36, {24, {0, 0, 0}});
     EXPECT_GT(count_ink(image), 3) << static_cast<char>(code);
     EXPECT_EQ(std::count(seen.begin(), seen.end(), image.rgb), 0) << static_cast<char>(code);
     seen.push_back(image.rgb);
@@ -42,7 +42,7 @@ TEST(Text, EveryPrintableCharacterHasAGlyphOfItsOwn) {
 
 TEST(Text, StaysWithinItsBox) {
   Image image = paper(300, 60);
-  draw_text(image, "Hxgy 0123", 20, 40, 20, {0, 0, 0});
+  draw_text(image, "Hxgy 0123", 20, 40, {20, {0, 0, 0}});
   const float width = text_width("Hxgy 0123", 20);
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
@@ -58,8 +58,8 @@ TEST(Text, StaysWithinItsBox) {
 TEST(Text, AlignmentMovesTheSameInk) {
   Image left = paper(200, 40);
   Image right = paper(200, 40);
-  draw_text(left, "0.05", 100, 30, 16, {0, 0, 0}, Align::Left);
-  draw_text(right, "0.05", 100 + text_width("0.05", 16), 30, 16, {0, 0, 0}, Align::Right);
+  draw_text(left, "0.05", 100, 30, {16, {0, 0, 0}, Align::Left});
+  draw_text(right, "0.05", 100 + text_width("0.05", 16), 30, {16, {0, 0, 0}, Align::Right});
   EXPECT_TRUE(left.rgb == right.rgb);
   EXPECT_GT(count_ink(left), 40);
 }
@@ -73,19 +73,19 @@ TEST(Text, DigitsShareOneWidth) {
 TEST(Text, OddBytesAreDrawnAsBoxes) {
   for (const char* text : {"\xff", "\xc3", "a\xe2\x88", "\xf0\x9f\x98\x80", "\x01"}) {
     Image image = paper(100, 40);
-    draw_text(image, text, 10, 30, 16, {0, 0, 0});
+    draw_text(image, text, 10, 30, {16, {0, 0, 0}});
     EXPECT_GT(count_ink(image), 5);
   }
   Image degree = paper(60, 40);
-  draw_text(degree, "\xc2\xb0", 10, 30, 16, {0, 0, 0});
+  draw_text(degree, "\xc2\xb0", 10, 30, {16, {0, 0, 0}});
   Image box = paper(60, 40);
-  draw_text(box, "\xff", 10, 30, 16, {0, 0, 0});
+  draw_text(box, "\xff", 10, 30, {16, {0, 0, 0}});
   EXPECT_FALSE(degree.rgb == box.rgb);
 }
 
 TEST(Text, IsCutOffAtTheImage) {
   Image image = paper(30, 20);
-  draw_text(image, "a long line that leaves the image", -40, 15, 16, {0, 0, 0});
+  draw_text(image, "a long line that leaves the image", -40, 15, {16, {0, 0, 0}});
   fill_rectangle(image, -5, -5, 10, 10, {1, 0, 0});
   fill_disc(image, 29, 19, 8, {0, 0, 1});
   fill_disc(image, 1e9F, -1e9F, 8, {0, 0, 1});
