@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -15,6 +16,11 @@ namespace {
 
 /// Below this size METIS coarsening has nothing to work with, and growing is as good.
 constexpr std::size_t kSmallSet = 24;
+
+/// Above this, METIS's short border is given up for a better balance.
+constexpr double kPoorBalance = 1.05;
+
+constexpr double kUnsplit = std::numeric_limits<double>::infinity();
 
 static_assert(sizeof(idx_t) == sizeof(std::int32_t), "METIS must be built with 32-bit indices");
 
@@ -56,29 +62,45 @@ bool Bisector::split_with_metis(double share) {
   return status == METIS_OK && second > 0 && second < static_cast<std::ptrdiff_t>(side_.size());
 }
 
-/// Breadth-first from a triangle far from the middle until the share is reached.
-void Bisector::split_by_growing(double share) {
-  const auto breadth_first = [&](int start) {
-    visited_.assign(weight_.size(), 0);
-    queue_.assign(1, start);
-    visited_[static_cast<std::size_t>(start)] = 1;
-    for (std::size_t head = 0; head < queue_.size(); ++head)
-      for (auto k = begin_[static_cast<std::size_t>(queue_[head])];
-           k < begin_[static_cast<std::size_t>(queue_[head]) + 1]; ++k) {
-        const int next = neighbor_[static_cast<std::size_t>(k)];
-        if (visited_[static_cast<std::size_t>(next)]) continue;
-        visited_[static_cast<std::size_t>(next)] = 1;
-        queue_.push_back(next);
-      }
-  };
-  breadth_first(0);
-  breadth_first(queue_.back());
+/// Fills queue_ with the whole set, nearest to `start` first, and returns the farthest triangle.
+int Bisector::breadth_first(int start) {
+  visited_.assign(weight_.size(), 0);
+  queue_.assign(1, start);
+  visited_[static_cast<std::size_t>(start)] = 1;
+  for (std::size_t head = 0; head < queue_.size(); ++head)
+    for (auto k = begin_[static_cast<std::size_t>(queue_[head])];
+         k < begin_[static_cast<std::size_t>(queue_[head]) + 1]; ++k) {
+      const int next = neighbor_[static_cast<std::size_t>(k)];
+      if (visited_[static_cast<std::size_t>(next)]) continue;
+      visited_[static_cast<std::size_t>(next)] = 1;
+      queue_.push_back(next);
+    }
+  return queue_.back();
+}
+
+/// Side 0 grows from `start` until it has its share.
+void Bisector::split_by_growing(int start, double share) {
+  breadth_first(start);
   const double target = share * std::accumulate(weight_.begin(), weight_.end(), 0.0);
   side_.assign(weight_.size(), 1);
   double grown = 0;
   for (std::size_t i = 0; i + 1 < queue_.size() && (i == 0 || grown < target); ++i) {
     side_[static_cast<std::size_t>(queue_[i])] = 0;
     grown += weight_[static_cast<std::size_t>(queue_[i])];
+  }
+}
+
+/// Tries growing from both ends of the set; keeps what is there unless that is balanced better.
+void Bisector::improve_by_growing(double share) {
+  const int one_end = breadth_first(0);
+  const int other_end = breadth_first(one_end);
+  for (const int start : {one_end, other_end}) {
+    const std::vector<std::int32_t> before = side_;
+    const double imbalance_before = before.empty() ? kUnsplit : imbalance(share);
+    split_by_growing(start, share);
+    make_connected();
+    rebalance(share);
+    if (imbalance(share) >= imbalance_before) side_ = before;
   }
 }
 
@@ -180,9 +202,13 @@ void Bisector::rebalance(double share) {
 std::size_t Bisector::split(std::span<int> set, double share) {
   PIECEWORK_ASSERT(set.size() >= 2);
   extract(set);
-  if (set.size() < kSmallSet || !split_with_metis(share)) split_by_growing(share);
-  make_connected();
-  rebalance(share);
+  if (set.size() >= kSmallSet && split_with_metis(share)) {
+    make_connected();
+    rebalance(share);
+  } else {
+    side_.clear();
+  }
+  if (side_.empty() || imbalance(share) > kPoorBalance) improve_by_growing(share);
   std::vector<int> second;
   std::size_t first_size = 0;
   for (std::size_t i = 0; i < set.size(); ++i) {

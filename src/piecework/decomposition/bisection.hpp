@@ -30,7 +30,9 @@ class Bisector {
  private:
   void extract(std::span<const int> set);
   bool split_with_metis(double share);
-  void split_by_growing(double share);
+  int breadth_first(int start);
+  void split_by_growing(int start, double share);
+  void improve_by_growing(double share);
   void keep_largest_part(int side);
   void make_connected();
   void rebalance(double share);

@@ -1,6 +1,7 @@
 #include <piecework/decomposition/decomposition.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <queue>
 
@@ -111,7 +112,7 @@ std::vector<Piece> pack(std::vector<Piece> pieces, int bins) {
 class TreeBuilder {
  public:
   TreeBuilder(const TriangleGraph& graph, const Options& options, Decomposition& result)
-      : bisector_(graph, options.seed), result_(result) {}
+      : graph_(graph), bisector_(graph, options.seed), result_(result) {}
 
   /// Joins pieces by nodes without separator, then bisects each.
   int join(std::span<Piece> pieces, int parent) {
@@ -146,18 +147,27 @@ class TreeBuilder {
       ++result_.num_domains;
       return node;
     }
-    const int wanted = domains / 2;
-    const std::size_t first = bisector_.split(set, static_cast<double>(wanted) / domains);
-    // Each side needs at least as many triangles as domains; small sets may not split as asked.
+    const std::size_t first = bisector_.split(set, static_cast<double>(domains / 2) / domains);
+    // Domains are shared out by the weight that each side really got: where a set cannot be halved
+    // (limbs of unequal size), the domains still can. Each needs a triangle.
+    const double share = weight(set.first(first)) / weight(set);
     const int second = static_cast<int>(set.size() - first);
-    const int left = std::clamp(wanted, std::max(1, domains - second),
-                                std::min(domains - 1, static_cast<int>(first)));
+    const int left =
+        std::clamp(static_cast<int>(std::lround(share * domains)), std::max(1, domains - second),
+                   std::min(domains - 1, static_cast<int>(first)));
     const int left_node = bisect(set.first(first), left, node);
     const int right_node = bisect(set.subspan(first), domains - left, node);
     finish(node, left_node, right_node);
     return node;
   }
 
+  [[nodiscard]] double weight(std::span<const int> set) const {
+    double sum = 0;
+    for (const int triangle : set) sum += graph_.weight[static_cast<std::size_t>(triangle)];
+    return sum;
+  }
+
+  const TriangleGraph& graph_;
   Bisector bisector_;
   Decomposition& result_;
 };

@@ -196,32 +196,32 @@ TEST(Decomposition, MoreComponentsThanDomainsArePacked) {
   EXPECT_EQ(summarize(d, five.elements()).boundary, 0);
 }
 
-/// Cells of a grid that lie on one of three arms, each `width` of 1 wide: a T.
-mesh::TriangleMesh three_arms(int cells, double width) {
+/// A palm with five fingers: what is left of a grid without the gaps between the fingers.
+mesh::TriangleMesh hand(int cells_per_finger) {
+  const int cells = 9 * cells_per_finger;
   mesh::TriangleMesh mesh = testing::grid_mesh(cells + 1, cells + 1);
   std::erase_if(mesh.triangles, [&](const Triangle& t) {
     const Eigen::RowVector3d center =
         (mesh.positions.row(t[0]) + mesh.positions.row(t[1]) + mesh.positions.row(t[2])) / 3;
-    const bool bar = center.z() < width;
-    const bool stem = std::abs(center.x() - 0.5) < 0.5 * width;
-    return !bar && !stem;
+    return center.z() > 0.2 && static_cast<int>(9 * center.x()) % 2 == 1;
   });
   return mesh;
 }
 
 // METIS likes to give a side two ends of different limbs; putting them together again must not cost
-// the balance.
+// the balance. Few domains may be out of balance all the same: fingers cannot be halved lengthwise.
 TEST(Decomposition, LimbsAreConnectedAndBalanced) {
-  std::vector<Case> cases{Case(three_arms(60, 0.1)), Case(three_arms(40, 0.05))};
+  const auto expect_balanced = [](const Case& c, int domains, double balance) {
+    SCOPED_TRACE(domains);
+    const Decomposition d = c.decompose(domains);
+    for (int k = 0; k < domains; ++k) EXPECT_TRUE(connected(c, d, k)) << k;
+    EXPECT_LT(summarize(d, c.elements()).balance, balance);
+  };
+  for (const int domains : {8, 16}) expect_balanced(Case(hand(7)), domains, 1.3);
   const std::string body = std::string(PIECEWORK_SHARED_DATA) + "/colliders/Armadillo_15K.ply";
-  if (std::filesystem::exists(body)) cases.emplace_back(mesh::import_mesh(body, {}).mesh);
-  for (const Case& c : cases)
-    for (const int domains : {2, 3, 4, 8, 16}) {
-      SCOPED_TRACE(domains);
-      const Decomposition d = c.decompose(domains);
-      for (int k = 0; k < domains; ++k) EXPECT_TRUE(connected(c, d, k)) << k;
-      EXPECT_LT(summarize(d, c.elements()).balance, 1.15);
-    }
+  if (!std::filesystem::exists(body)) return;
+  const Case armadillo(mesh::import_mesh(body, {}).mesh);
+  for (const int domains : {2, 3, 4, 8, 16, 64}) expect_balanced(armadillo, domains, 1.1);
 }
 
 TEST(Decomposition, IsAFunctionOfItsInputOnly) {
