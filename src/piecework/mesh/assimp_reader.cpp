@@ -1,5 +1,6 @@
 #include <piecework/mesh/assimp_reader.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -276,12 +277,28 @@ std::string read_and_pack(const fs::path& path, const std::string& extension,
   return pack(SceneCollector(path.string(), *scene, extension != ".stl", max_triangles).run());
 }
 
+/// Limits by the size of the file, so that a small hostile one cannot take minutes and gigabytes.
+/// Chosen generously: assimp needs up to about 40 bytes of memory per byte of file. A .gltf refers
+/// to data of unknown size and gets the defaults.
+ChildLimits limits_for(const fs::path& path, const std::string& extension) {
+  ChildLimits limits;
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(path, error);
+  if (error || extension == ".gltf") return limits;
+  constexpr std::uintmax_t kMebibyte = std::uintmax_t{1} << 20;
+  limits.memory_bytes =
+      std::min<std::uintmax_t>(limits.memory_bytes, 512 * kMebibyte + 200 * bytes);
+  limits.seconds = std::min(limits.seconds, static_cast<unsigned>(10 + bytes / kMebibyte));
+  return limits;
+}
+
 }  // namespace
 
 RawMesh read_with_assimp(const fs::path& path, const std::string& extension,
                          std::size_t max_triangles) {
-  const std::string bytes =
-      run_in_child(path.string(), [&] { return read_and_pack(path, extension, max_triangles); });
+  const std::string bytes = run_in_child(
+      path.string(), [&] { return read_and_pack(path, extension, max_triangles); },
+      limits_for(path, extension));
   return unpack(path.string(), bytes, extension != ".stl");
 }
 
