@@ -61,13 +61,8 @@ model::RestShape rest_shape(const scene::Cloth& cloth, const mesh::MeshDocument&
   if (cloth.rest != "file")
     return model::rest_from_positions(document.mesh.positions, document.mesh.triangles, where);
   const mesh::MeshDocument rest = mesh::import_mesh(cloth.rest_file, import_options(cloth.mesh));
-  if (rest.mesh.triangles != document.mesh.triangles ||
-      rest.mesh.num_vertices() != document.mesh.num_vertices())
-    throw InputError(fmt::format(
-        "{}/rest_file: {} has other faces than the mesh ({} and {} triangles); rest and "
-        "start shape need the same faces in the same order",
-        where, cloth.rest_file, rest.mesh.num_triangles(), document.mesh.num_triangles()));
-  return model::rest_from_positions(rest.mesh.positions, rest.mesh.triangles, cloth.rest_file);
+  const Positions positions = mesh::corresponding_positions(document, rest, cloth.rest_file);
+  return model::rest_from_positions(positions, document.mesh.triangles, cloth.rest_file);
 }
 
 bool in_box(const Vec3& x, const std::array<std::array<double, 3>, 2>& box) {
