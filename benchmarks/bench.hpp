@@ -2,6 +2,8 @@
 
 // What every benchmark driver shares; bench_main.cpp holds main() and this header's functions.
 
+#include <cmath>
+#include <cstdint>
 #include <string>
 
 #include <benchmark/benchmark.h>
@@ -31,6 +33,12 @@ void fail(benchmark::State& state, const std::string& reason);
 /// Ends a benchmark that makes no sense on this machine (say, more threads than cores). The reason
 /// is shown; the program's exit code stays as it is. Leave the benchmark's function after the call.
 void skip(benchmark::State& state, const std::string& reason);
+
+/// Vertices along one side of a square sheet of `vertices` (a square number, as in row names
+/// n:...).
+inline int side_of(std::int64_t vertices) {
+  return static_cast<int>(std::lround(std::sqrt(static_cast<double>(vertices))));
+}
 
 /// Makes the compiler believe that `value` is read, so that it computes it. Instead of
 /// benchmark::DoNotOptimize(), which in 1.7.1 lets g++ 12 overwrite an lvalue with garbage
