@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <piecework/core/parallel_tsan.hpp>
 #include <piecework/core/random.hpp>
 
 namespace piecework {
@@ -35,6 +36,21 @@ TEST(Parallel, SumHasTheSameBitsForEveryThreadCount) {
   ASSERT_NE(forward, expected) << "the data cannot show a difference";
   EXPECT_NEAR(forward, expected, 1e-6 * std::abs(expected) + 1e-3);
   for (int threads : {2, 3, 8, 8, 8}) EXPECT_EQ(sum_on(threads), expected) << threads;
+}
+
+// The thread-sanitizer build swaps oneTBB for plain threads; it must not change a bit.
+TEST(Parallel, SanitizerLoopsHaveTheSameBits) {
+  const std::vector<double> terms = random_terms(100'003);
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{513}, terms.size()}) {
+    const double plain = tsan::parallel_reduce(
+        count, 0.0,
+        [&](std::size_t begin, std::size_t end, double sum) {
+          for (std::size_t i = begin; i != end; ++i) sum += terms[i];
+          return sum;
+        },
+        [](double left, double right) { return left + right; }, kParallelGrain);
+    EXPECT_EQ(plain, parallel_sum<double>(count, [&](std::size_t i) { return terms[i]; })) << count;
+  }
 }
 
 TEST(Parallel, ForVisitsEveryItemOnce) {

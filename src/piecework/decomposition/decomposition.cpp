@@ -147,7 +147,8 @@ class TreeBuilder {
       ++result_.num_domains;
       return node;
     }
-    const std::size_t first = bisector_.split(set, static_cast<double>(domains / 2) / domains);
+    const int half = domains / 2;
+    const std::size_t first = bisector_.split(set, static_cast<double>(half) / domains);
     // Domains are shared out by the weight that each side really got: where a set cannot be halved
     // (limbs of unequal size), the domains still can. Each needs a triangle.
     const double share = weight(set.first(first)) / weight(set);

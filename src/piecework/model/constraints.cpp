@@ -71,16 +71,19 @@ void check_part(const ClothPart& part) {
         fmt::format("{}: a start position is not finite; check the transform", part.name));
 }
 
+/// Where a vertex of a triangle lies in the triangle's flat rest shape.
+const Vec2& rest_corner(const ClothPart& part, int triangle, int vertex) {
+  const auto t = static_cast<std::size_t>(triangle);
+  std::size_t k = 0;
+  while (part.triangles[t][k] != vertex) ++k;
+  return part.rest.corners[t][k];
+}
+
 /// A triangle's corners in the order (x0, x1, opposite) of a hinge.
-std::array<Vec2, 3> hinge_side(const ClothPart& part, const mesh::Hinge& hinge, int side) {
-  const auto t = static_cast<std::size_t>(hinge.triangles[static_cast<std::size_t>(side)]);
-  const auto corner_of = [&](int vertex) -> const Vec2& {
-    const auto& triangle = part.triangles[t];
-    return part.rest.corners[t][static_cast<std::size_t>(
-        std::find(triangle.begin(), triangle.end(), vertex) - triangle.begin())];
-  };
-  return {corner_of(hinge.vertices[0]), corner_of(hinge.vertices[1]),
-          corner_of(hinge.vertices[static_cast<std::size_t>(2 + side)])};
+std::array<Vec2, 3> hinge_side(const ClothPart& part, const mesh::Hinge& hinge, std::size_t side) {
+  const int t = hinge.triangles[side];
+  return {rest_corner(part, t, hinge.vertices[0]), rest_corner(part, t, hinge.vertices[1]),
+          rest_corner(part, t, hinge.vertices[2 + side])};
 }
 
 BendConstraint make_bend(const ClothPart& part, const mesh::Hinge& hinge, int first_vertex) {
@@ -129,16 +132,10 @@ double add_hinges(const ClothPart& part, const std::vector<mesh::Edge>& edges, i
     model.hinges.push_back(hinge);
   }
   double length = 0;
-  for (const mesh::Edge& edge : edges) {
-    const auto t = static_cast<std::size_t>(edge.triangles[0]);
-    std::array<Vec2, 2> ends;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const auto& triangle = part.triangles[t];
-      ends[k] = part.rest.corners[t][static_cast<std::size_t>(
-          std::find(triangle.begin(), triangle.end(), edge.vertices[k]) - triangle.begin())];
-    }
-    length += (ends[1] - ends[0]).norm();
-  }
+  for (const mesh::Edge& edge : edges)
+    length += (rest_corner(part, edge.triangles[0], edge.vertices[1]) -
+               rest_corner(part, edge.triangles[0], edge.vertices[0]))
+                  .norm();
   return length;
 }
 

@@ -39,8 +39,8 @@ Mat32 closest_isometry_degenerate(const Mat32& F, const Mat32& reference) {
   if (!(size > 1e-100)) return reference;
   const Eigen::JacobiSVD<Mat32, Eigen::FullPivHouseholderQRPreconditioner> svd(
       F / size, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector2d sigma = svd.singularValues();
-  const Mat2 V = svd.matrixV();
+  const Eigen::Vector2d& sigma = svd.singularValues();
+  const Mat2& V = svd.matrixV();
   const Vec3 u1 = svd.matrixU().col(0);
   Vec3 u2 = svd.matrixU().col(1);
   if (sigma[1] < 1e-13 * sigma[0]) {

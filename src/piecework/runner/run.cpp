@@ -37,6 +37,18 @@ void clear_run(const fs::path& directory) {
     if (entry.path().filename().string().starts_with("frame_")) fs::remove(entry.path(), ignored);
 }
 
+/// Removes temporary files that a killed run could not rename: "frame_0003.ply.tmp4711".
+void clear_temporaries(const fs::path& directory) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(directory, ignored)) {
+    const std::string name = entry.path().filename().string();
+    const auto suffix = name.rfind(".tmp");
+    if (suffix != std::string::npos && is_run_file(name.substr(0, suffix)) &&
+        name.find_first_not_of("0123456789", suffix + 4) == std::string::npos)
+      fs::remove(entry.path(), ignored);
+  }
+}
+
 void refuse_other_scene(const fs::path& directory, const std::string& hash) {
   const fs::path path = directory / kResolvedScene;
   if (!fs::exists(path)) return;
@@ -98,6 +110,8 @@ class Run {
     else
       refuse_other_scene(options_.directory, record_.scene_hash);
     if (options_.save_states) ensure_directory(options_.directory / "state");
+    clear_temporaries(options_.directory);
+    clear_temporaries(options_.directory / "state");
     write_file_atomically(options_.directory / kResolvedScene, scene::resolved_json(world_->scene));
   }
 

@@ -82,8 +82,12 @@ TEST(Run, ContinuedRunHasTheSameBits) {
   Watcher first(3);
   EXPECT_TRUE(simulate(broken.path(), first).stopped);
   EXPECT_EQ(first.last, 3);
+  write_file_atomically(broken.path() / "frame_0004.ply.tmp4711", "left by a kill");
+  write_file_atomically(broken.path() / "mine.tmp4711", "not ours");
   Watcher second;
   const RunOutcome outcome = simulate(broken.path(), second, {.threads = 3, .resume = true});
+  EXPECT_FALSE(fs::exists(broken.path() / "frame_0004.ply.tmp4711"));
+  EXPECT_TRUE(fs::exists(broken.path() / "mine.tmp4711"));
   EXPECT_EQ(second.first, 3);
   EXPECT_EQ(outcome.frames_done, 8);
   EXPECT_TRUE(second.x == unbroken.x);
