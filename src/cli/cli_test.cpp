@@ -128,6 +128,20 @@ TEST_F(Cli, WrongInputIsExitCode3AndNamesFileItemAndRemedy) {
   EXPECT_EQ(call("partition " + dir("missing.obj") + " -k 2").code, 3);
 }
 
+TEST_F(Cli, OutputThatIsLostIsExitCode4) {
+  for (const char* command : {"env", "schema", "scenes"}) {
+    const int status = std::system(
+        fmt::format("'{}' {} >/dev/full 2>/dev/null", PIECEWORK_PROGRAM, command).c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 4) << command;
+  }
+  // Messages that nobody can read do not end a simulation.
+  const int status = std::system(fmt::format("'{}' run {} --no-images -o {} >/dev/null 2>/dev/full",
+                                             PIECEWORK_PROGRAM, scene(), dir("log"))
+                                     .c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_TRUE(fs::exists(dir("log/checkpoint.bin")));
+}
+
 TEST_F(Cli, UnwritableOutputIsExitCode4) {
   write_file_atomically(folder_ / "file", "in the way");
   const Result result = call("run " + scene() + " --no-images -o " + dir("file/sub"));
@@ -143,6 +157,13 @@ TEST_F(Cli, FailedExpectationIsExitCode5OnRequest) {
   EXPECT_EQ(result.code, 5);
   EXPECT_NE(result.err.find("lowest_y"), std::string::npos);
   EXPECT_EQ(call("run " + scene() + " --no-images --expect -o " + dir("good")).code, 0);
+}
+
+TEST_F(Cli, ExpectationThatIsNotReachedIsExitCode5) {
+  const Result result = call("run " + scene() + " --no-images --expect --set expect.0.at=0.05 " +
+                             "--frames 2 -o " + dir("short"));
+  EXPECT_EQ(result.code, 5);
+  EXPECT_NE(result.err.find("not reached"), std::string::npos) << result.err;
 }
 
 TEST_F(Cli, NoImagesNeedsNoOpenGl) {
@@ -291,6 +312,8 @@ TEST_F(CliPictures, RunDrawsFramesAndASheetAndRenderDrawsThemAgain) {
   EXPECT_TRUE(fs::exists(dir("p/s_2.png")));
   EXPECT_FALSE(fs::exists(dir("p/s_0.png")));
   EXPECT_EQ(call("render " + dir("p") + " --frames 2:7").code, 3);
+  EXPECT_EQ(call("render " + dir("p") + " -o '{frames}.png'").code, 2);
+  EXPECT_EQ(call("render " + dir("nowhere")).code, 3);
   EXPECT_EQ(call("render " + dir("p") + " -o one.png").code, 3);
 }
 

@@ -32,10 +32,10 @@ void add_schema(CLI::App& program, Action& action);
 void add_doctor(CLI::App& program, Action& action);
 void add_scenes(CLI::App& program, Action& action);
 
-/// Parses "key=value" as --set takes it. \throws CLI::ValidationError.
+/// Parses "key=value" as --set takes it. \throws Error (Usage).
 std::pair<std::string, std::string> parse_override(const std::string& text);
 
-/// Parses "1280x720". \throws CLI::ValidationError.
+/// Parses "1280x720". \throws Error (Usage).
 std::pair<int, int> parse_size(const std::string& text);
 
 }  // namespace piecework::cli

@@ -3,7 +3,9 @@
 
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <new>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -11,6 +13,7 @@
 #include <piecework/core/error.hpp>
 
 #include "commands.hpp"
+#include "console.hpp"
 
 namespace piecework::cli {
 namespace {
@@ -36,7 +39,7 @@ class Formatter : public CLI::Formatter {
 };
 
 int report(const Error& error) {
-  fmt::print(stderr, "piecework: {}\n", error.what());
+  say("piecework: {}\n", error.what());
   return static_cast<int>(error.code());
 }
 
@@ -66,13 +69,20 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::Success& done) {  // --help, --version
     return program.exit(done);
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "piecework: {}\nTry: piecework --help\n", error.what());
+    say("piecework: {}\nTry: piecework --help\n", error.what());
     return static_cast<int>(ExitCode::Usage);
   }
   try {
-    return action();
+    const int code = action();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+      return report(OutputError("standard output: cannot be written"));
+    return code;
   } catch (const Error& error) {
     return report(error);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return report(InputError(error.what()));
+  } catch (const std::system_error& error) {  // fmt cannot print
+    return report(OutputError(error.what()));
   } catch (const std::bad_alloc&) {
     return report(SimulationError("out of memory; use a smaller mesh or --no-images"));
   }

@@ -11,6 +11,7 @@
 #include <piecework/scene/scene_io.hpp>
 
 #include "commands.hpp"
+#include "console.hpp"
 #include "mesh_scene.hpp"
 #include "pictures.hpp"
 
@@ -67,10 +68,9 @@ int partition(const PartitionArguments& arguments, bool k_given, const Verbosity
   if (k_given) scene.solver.domains = arguments.mesh.domains;
   const auto world = runner::build_world(scene);
   for (const std::string& note : world->notes)
-    if (!verbosity.quiet) fmt::print(stderr, "note: {}\n", note);
+    if (!verbosity.quiet) say("note: {}\n", note);
   if (verbosity.verbose)
-    fmt::print(stderr, "loaded in {:.0f} ms, divided in {:.0f} ms\n", world->load_ms,
-               world->partition_ms);
+    say("loaded in {:.0f} ms, divided in {:.0f} ms\n", world->load_ms, world->partition_ms);
   if (!arguments.picture.empty()) {
     PictureOptions options = picture_options(scene);
     std::tie(options.width, options.height) = parse_size(arguments.size);

@@ -31,6 +31,9 @@ render::Provider provider(const std::string& name) {
   return render::Provider::Auto;
 }
 
+/// A colour scale that ends below this would show rounding.
+constexpr float kLeastStrain = 1e-3F;
+
 /// What all pictures of a series share.
 struct Extent {
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
@@ -93,6 +96,16 @@ class Encoder {
   std::future<void> pending_;
 };
 
+std::string picture_name(const std::string& pattern, int frame) {
+  try {
+    return fmt::format(fmt::runtime(pattern), fmt::arg("frame", frame));
+  } catch (const fmt::format_error& error) {
+    throw Error(ExitCode::Usage, fmt::format("-o {}: {}; the only placeholder is {{frame}}, e.g. "
+                                             "'frame_{{frame:04}}.png'",
+                                             pattern, error.what()));
+  }
+}
+
 }  // namespace
 
 PictureOptions picture_options(const scene::Scene& scene) {
@@ -121,7 +134,7 @@ void take_pictures(const runner::World& world, const std::vector<Shot>& shots,
   const Extent extent = measure(world, shots, strain);
   const double margin = 0.02 * (extent.high - extent.low).maxCoeff();
   style.ground_height = world.scene.camera.ground.value_or(extent.low.y() - margin);
-  style.value_high = round_up(extent.strain);
+  style.value_high = round_up(std::max(extent.strain, kLeastStrain));
   const render::Camera camera =
       make_camera(world.scene.camera, extent, static_cast<double>(options.width) / options.height);
   const auto adjacent = decomposition::adjacent_domains(world.domains, world.model.hinges);
@@ -170,17 +183,16 @@ void write_contact_sheet(const std::vector<Shot>& shots, const std::filesystem::
 
 std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem::path& directory,
                                int first, int last, const std::string& pattern) {
-  const std::string hash = runner::motion_hash(world.scene);
+  const std::string hash = runner::motion_hash(world);
   std::vector<Shot> shots;
   for (int frame = first; frame <= last; ++frame) {
     const std::filesystem::path state = directory / "state" / (runner::frame_name(frame) + ".bin");
     const auto positions = [&world, state, hash] {
       return runner::read_state(state, hash, world.model.num_vertices()).x;
     };
-    shots.push_back(
-        {.positions = positions,
-         .time = frame * world.scene.step.output_every * world.scene.step.h,
-         .path = directory / fmt::format(fmt::runtime(pattern), fmt::arg("frame", frame))});
+    shots.push_back({.positions = positions,
+                     .time = frame * world.scene.step.output_every * world.scene.step.h,
+                     .path = directory / picture_name(pattern, frame)});
   }
   return shots;
 }

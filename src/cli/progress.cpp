@@ -1,4 +1,5 @@
 #include "progress.hpp"
+#include "console.hpp"
 
 #include <unistd.h>
 
@@ -51,15 +52,14 @@ void Progress::update(int done, const std::string& detail) {
   }
   if (!detail.empty()) line += "  (" + detail + ")";
   if (terminal_)
-    fmt::print(stderr, "\r\033[K{}", line);
+    say("\r\033[K{}", line);
   else
-    fmt::print(stderr, "{}\n", line);
-  std::fflush(stderr);
+    say("{}\n", line);
   line_open_ = terminal_;
 }
 
 void Progress::finish() {
-  if (line_open_) fmt::print(stderr, "\n");
+  if (line_open_) say("\n");
   line_open_ = false;
 }
 

@@ -124,7 +124,7 @@ void add_render(CLI::App& program, Action& action, const Verbosity& verbosity) {
   CLI::App* app = program.add_subcommand("render", kExamples);
   app->add_option("input", arguments->input, "Run directory, or mesh file")->required();
   app->add_option("-o,--output", arguments->output,
-                  "PNG file; with {frame} or {frame:04} for several frames");
+                  "PNG file; of a run: relative to its directory, with {frame} or {frame:04}");
   app->add_option("--frames", arguments->frames, "A:B, A: or :B [all]");
   app->add_option("--color", arguments->color, "domain, dof, strain or shaded [as the scene says]")
       ->check(CLI::IsMember({"domain", "dof", "strain", "shaded"}));
@@ -136,6 +136,11 @@ void add_render(CLI::App& program, Action& action, const Verbosity& verbosity) {
   add_mesh_options(*app, arguments->mesh);
   app->callback([arguments, &action, &verbosity] {
     action = [arguments, &verbosity] {
+      if (!fs::exists(arguments->input))
+        throw InputError(
+            fmt::format("{}: no such file or directory; name a run directory or a mesh "
+                        "file (a scene is drawn by `piecework run`)",
+                        arguments->input));
       return fs::is_directory(arguments->input) ? render_run(*arguments, verbosity)
                                                 : render_mesh(*arguments, verbosity);
     };

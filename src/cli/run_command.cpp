@@ -12,6 +12,7 @@
 #include <piecework/scene/scene_io.hpp>
 
 #include "commands.hpp"
+#include "console.hpp"
 #include "pictures.hpp"
 #include "progress.hpp"
 
@@ -41,10 +42,15 @@ class SignalGuard {
     action.sa_flags = static_cast<int>(SA_RESETHAND);
     sigaction(SIGINT, &action, &old_int_);
     sigaction(SIGTERM, &action, &old_term_);
+    // A reader of our messages that goes away (`| head`) must not end a simulation.
+    action.sa_handler = SIG_IGN;
+    action.sa_flags = 0;
+    sigaction(SIGPIPE, &action, &old_pipe_);
   }
   ~SignalGuard() {
     sigaction(SIGINT, &old_int_, nullptr);
     sigaction(SIGTERM, &old_term_, nullptr);
+    sigaction(SIGPIPE, &old_pipe_, nullptr);
   }
   SignalGuard(const SignalGuard&) = delete;
   SignalGuard& operator=(const SignalGuard&) = delete;
@@ -52,6 +58,7 @@ class SignalGuard {
  private:
   struct sigaction old_int_ {};
   struct sigaction old_term_ {};
+  struct sigaction old_pipe_ {};
 };
 
 struct RunArguments {
@@ -73,24 +80,34 @@ struct RunArguments {
   std::string color;
 };
 
+bool has_states(const std::filesystem::path& directory) {
+  return std::filesystem::exists(directory / "state" / (runner::frame_name(0) + ".bin"));
+}
+
 class ConsoleObserver : public runner::RunObserver {
  public:
-  explicit ConsoleObserver(const Verbosity& verbosity)
-      : verbosity_(verbosity), progress_("simulating", verbosity.quiet) {}
+  /// \param pictures_from  the directory whose states will be drawn; empty: none will
+  ConsoleObserver(const Verbosity& verbosity, std::filesystem::path pictures_from)
+      : verbosity_(verbosity),
+        pictures_from_(std::move(pictures_from)),
+        progress_("simulating", verbosity.quiet) {}
 
   void started(const runner::World& world, int first_frame, int frames) override {
+    if (!pictures_from_.empty() && first_frame > 0 && first_frame < frames &&
+        !has_states(pictures_from_))
+      throw InputError(
+          fmt::format("{}: its first frames were run with --no-state and cannot be "
+                      "drawn any more; use --no-images, or --overwrite to start anew",
+                      pictures_from_.string()));
     if (!verbosity_.quiet) {
       const auto& s = world.domain_summary;
-      fmt::print(stderr,
-                 "{}: {} vertices, {} triangles, {} domains (C|B|R {}|{}|{}, balance {:.3f})\n",
-                 world.scene.name, world.model.num_vertices(), world.model.triangles.size(),
-                 s.domains, s.corner, s.boundary, s.remainder, s.balance);
-      for (const std::string& note : world.notes) fmt::print(stderr, "note: {}\n", note);
-      if (first_frame > 0 && first_frame < frames)
-        fmt::print(stderr, "continuing after frame {}\n", first_frame);
+      say("{}: {} vertices, {} triangles, {} domains (C|B|R {}|{}|{}, balance {:.3f})\n",
+          world.scene.name, world.model.num_vertices(), world.model.triangles.size(), s.domains,
+          s.corner, s.boundary, s.remainder, s.balance);
+      for (const std::string& note : world.notes) say("note: {}\n", note);
+      if (first_frame > 0 && first_frame < frames) say("continuing after frame {}\n", first_frame);
       if (first_frame >= frames && first_frame > 0)
-        fmt::print(stderr, "all {} frames are there already; --overwrite runs them again\n",
-                   frames);
+        say("all {} frames are there already; --overwrite runs them again\n", first_frame);
     }
     progress_.start(first_frame, frames);
   }
@@ -109,6 +126,7 @@ class ConsoleObserver : public runner::RunObserver {
 
  private:
   const Verbosity& verbosity_;
+  std::filesystem::path pictures_from_;
   Progress progress_;
 };
 
@@ -127,23 +145,48 @@ PictureOptions pictures_for(const scene::Scene& scene, const RunArguments& argum
   return options;
 }
 
+/// Removes the saved states, and their folder if nothing else is in it.
+void remove_states(const std::filesystem::path& directory, int last_frame) {
+  std::error_code ignored;
+  for (int frame = 0; frame <= last_frame; ++frame)
+    std::filesystem::remove(directory / "state" / (runner::frame_name(frame) + ".bin"), ignored);
+  std::filesystem::remove(directory / "state", ignored);
+}
+
 void draw(const runner::RunOutcome& outcome, const RunArguments& arguments,
           const Verbosity& verbosity) {
   const std::filesystem::path directory = arguments.directory;
+  if (!outcome.simulated && !has_states(directory)) return;  // drawn before, with --no-state
   const auto shots =
       shots_of_run(*outcome.world, directory, 0, outcome.frames_done, "frame_{frame:04}.png");
   Progress progress("drawing", verbosity.quiet);
   take_pictures(*outcome.world, shots, pictures_for(outcome.world->scene, arguments), progress);
   write_contact_sheet(shots, directory / "contact_sheet.png");
-  std::error_code ignored;
-  if (arguments.no_state) std::filesystem::remove_all(directory / "state", ignored);
+  if (arguments.no_state) remove_states(directory, outcome.frames_done);
+}
+
+/// Says how many steps ended before their stop rule held.
+void report_convergence(const runner::RunOutcome& outcome) {
+  int steps = 0;
+  int converged = 0;
+  for (const runner::FrameRecord& frame : outcome.record.frames) {
+    steps += frame.steps;
+    converged += frame.converged_steps;
+  }
+  const scene::Quality& quality = outcome.world->scene.quality;
+  if (converged < steps && quality.stop != "iterations")
+    say("note: {} of {} steps stopped at {} iterations before `{}` reached {:g}\n",
+        steps - converged, steps, quality.max_iterations, quality.stop, quality.tolerance);
 }
 
 int report(const runner::RunOutcome& outcome, const RunArguments& arguments) {
   for (const auto& e : outcome.record.expectations)
-    if (!e.holds) fmt::print(stderr, "expectation fails: {}; found {:.6g}\n", e.text, e.value);
+    if (e.reached && !e.holds)
+      say("expectation fails: {}; found {:.6g}\n", e.text, e.value);
+    else if (!e.reached && arguments.expect && !outcome.stopped)
+      say("expectation not reached: {}; simulate more frames\n", e.text);
   if (outcome.stopped) {
-    fmt::print(stderr, "stopped after frame {}; continue with --resume\n", outcome.frames_done);
+    say("stopped after frame {}; continue with --resume\n", outcome.frames_done);
     return 128 + stop_signal;
   }
   fmt::print("{}\n", (std::filesystem::path(arguments.directory) / "summary.md").string());
@@ -166,13 +209,18 @@ int run(const RunArguments& arguments, const Verbosity& verbosity) {
   // Without OpenGL a run with pictures would fail only at its end: find out now.
   if (!arguments.no_images) check_pictures(pictures_for(scene, arguments));
 
-  const SignalGuard guard;
-  ConsoleObserver observer(verbosity);
-  const runner::RunOutcome outcome = runner::run(scene, options, observer);
-  observer.finish();
+  const runner::RunOutcome outcome = [&] {
+    // Only while it simulates: a signal while it draws ends the program; the checkpoint is there.
+    const SignalGuard guard;
+    ConsoleObserver observer(verbosity, arguments.no_images ? "" : options.directory);
+    runner::RunOutcome result = runner::run(scene, options, observer);
+    observer.finish();
+    return result;
+  }();
   RunArguments resolved = arguments;
   resolved.directory = options.directory.string();
   if (!arguments.no_images && !outcome.stopped) draw(outcome, resolved, verbosity);
+  if (!verbosity.quiet) report_convergence(outcome);
   return report(outcome, resolved);
 }
 
@@ -185,7 +233,7 @@ void add_run(CLI::App& program, Action& action, const Verbosity& verbosity) {
       ->required();
   app->add_option("-o,--output", arguments->directory, "Directory [out/<scene name>]");
   app->add_option("--frames", arguments->frames, "Frames to simulate [as the scene says]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, 1'000'000'000));
   app->add_option("--threads", arguments->threads, "Threads [as the scene says, else all]")
       ->check(CLI::Range(1, 1024));
   app->add_option("--set", arguments->set,
@@ -203,8 +251,9 @@ void add_run(CLI::App& program, Action& action, const Verbosity& verbosity) {
       ->allow_extra_args(false);
   app->add_option("--checkpoint-every", arguments->checkpoint_every,
                   "Frames between checkpoints [at the end only]")
-      ->check(CLI::NonNegativeNumber);
-  app->add_flag("--resume", arguments->resume, "Continue an interrupted run from its checkpoint");
+      ->check(CLI::Range(0, 1'000'000'000));
+  app->add_flag("--resume", arguments->resume,
+                "Continue from the checkpoint (the default); says so if there is none");
   app->add_flag("--overwrite", arguments->overwrite,
                 "Replace what an earlier run left in the directory");
   app->add_flag("--expect", arguments->expect, "Exit with 5 if an expectation of the scene fails");

@@ -58,6 +58,11 @@ void VanillaPd::prepare(const std::vector<char>& fixed) {
         "too extreme for double precision: bring them closer together");
 }
 
+model::SetupReport VanillaPd::setup_report() const {
+  const global::FactorReport& report = solver_.report();
+  return {report.analyze_ms + report.factor_ms, report.nonzeros, static_cast<double>(report.bytes)};
+}
+
 StepReport VanillaPd::minimize(const model::StepProblem& problem, Positions& x) {
   StepReport report;
   Stopwatch watch;

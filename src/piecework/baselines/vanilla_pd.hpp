@@ -21,11 +21,9 @@ class VanillaPd final : public model::Minimizer {
   VanillaPd(const model::ClothModel& model, double h, double gravity, model::StopOptions stop);
 
   void prepare(const std::vector<char>& fixed) override;
+  [[nodiscard]] model::SetupReport setup_report() const override;
   model::StepReport minimize(const model::StepProblem& problem, Positions& x) override;
   [[nodiscard]] std::string description() const override;
-
-  /// Sizes and times of the last factorisation.
-  [[nodiscard]] const global::FactorReport& factor_report() const { return solver_.report(); }
 
  private:
   /// Estimates the remaining error from the decay of the increments (docs/architecture.md, D9).

@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include <piecework/core/descriptor.hpp>
 #include <piecework/core/error.hpp>
 
 namespace piecework {
@@ -20,22 +21,6 @@ namespace {
 [[noreturn]] void fail(const std::filesystem::path& path, const char* what, int error) {
   throw OutputError(fmt::format("{}: {}: {}", path.string(), what, std::strerror(error)));
 }
-
-/// A POSIX descriptor closed on every path out.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-  int close() { return ::close(std::exchange(fd_, -1)); }
-
- private:
-  int fd_;
-};
 
 /// Removes the temporary file unless it was renamed into place.
 class TemporaryFile {
@@ -63,9 +48,22 @@ int write_all(int fd, std::string_view content) {
   return 0;
 }
 
+/// The file behind links. Devices, pipes and folders are not replaced by a file.
+std::filesystem::path writable_target(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return path;
+  if (!std::filesystem::is_regular_file(status))
+    throw OutputError(
+        fmt::format("{}: exists and is no regular file; name another", path.string()));
+  const auto target = std::filesystem::canonical(path, error);
+  return error ? path : target;
+}
+
 }  // namespace
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view content) {
+void write_file_atomically(const std::filesystem::path& named, std::string_view content) {
+  const std::filesystem::path path = writable_target(named);
   const std::string temporary_path = fmt::format("{}.tmp{}", path.string(), ::getpid());
   Descriptor file(::open(temporary_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (file.get() < 0) fail(path, "cannot create the file", errno);

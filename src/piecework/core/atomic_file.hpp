@@ -8,7 +8,8 @@
 
 namespace piecework {
 
-/// Writes `content` to `path`, replacing what was there in one step.
+/// Writes `content` to `path`, replacing what was there in one step. Links are followed; a device,
+/// pipe or folder is refused.
 /// \throws OutputError with path and reason; then `path` is as it was before and no temporary
 ///         file is left.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);

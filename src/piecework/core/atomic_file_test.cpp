@@ -1,5 +1,6 @@
 #include <piecework/core/atomic_file.hpp>
 
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -51,6 +52,17 @@ TEST_F(AtomicFile, FailureNamesThePathAndLeavesNothing) {
   fs::create_directory(folder_ / "taken" / "inside");
   EXPECT_THROW(write_file_atomically(folder_ / "taken", "x"), OutputError);
   EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(AtomicFile, LinksAreFollowedAndPipesKept) {
+  write_file_atomically(folder_ / "target", "old");
+  fs::create_symlink("target", folder_ / "link");
+  write_file_atomically(folder_ / "link", "new");
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_EQ(read_file(folder_ / "target"), "new");
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  EXPECT_THROW(write_file_atomically(folder_ / "pipe", "x"), OutputError);
+  EXPECT_TRUE(fs::is_fifo(folder_ / "pipe"));
 }
 
 TEST_F(AtomicFile, ReadingReportsWhatIsWrong) {

@@ -18,8 +18,8 @@ class Hash {
     return *this;
   }
   Hash& add(std::string_view text) { return add_bytes(text.data(), text.size()); }
-  template <class T>
-  Hash& add(std::span<const T> values) {
+  template <class T, std::size_t N>
+  Hash& add(std::span<T, N> values) {
     return add_bytes(values.data(), values.size_bytes());
   }
   [[nodiscard]] std::uint64_t value() const { return value_; }

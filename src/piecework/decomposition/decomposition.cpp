@@ -119,7 +119,9 @@ class TreeBuilder {
     if (pieces.size() == 1) return bisect(pieces[0].triangles, pieces[0].domains, parent);
     const int node = add_node(parent);
     const std::size_t half = pieces.size() / 2;
-    finish(node, join(pieces.first(half), node), join(pieces.subspan(half), node));
+    const int left = join(pieces.first(half), node);  // numbered before the right half
+    const int right = join(pieces.subspan(half), node);
+    finish(node, left, right);
     return node;
   }
 

@@ -185,6 +185,22 @@ TEST(Decomposition, ComponentsAreSplitBeforeBisection) {
   EXPECT_EQ(std::count(d.vertex_node.begin(), d.vertex_node.end(), 0), 0);
 }
 
+TEST(Decomposition, ManyComponentsShareATreeWithoutSeparators) {
+  for (const int components : {3, 4, 7}) {
+    SCOPED_TRACE(components);
+    mesh::TriangleMesh pieces = testing::grid_mesh(5, 5);
+    for (int i = 1; i < components; ++i)
+      pieces = testing::disjoint_union(pieces, testing::grid_mesh(4 + i, 5));
+    const Case c(pieces);
+    const Decomposition d = c.decompose(components);
+    expect_sound(c, d);
+    for (const int node : d.vertex_node)
+      EXPECT_TRUE(d.nodes[static_cast<std::size_t>(node)].is_leaf()) << "nothing is shared";
+    const Decomposition finer = c.decompose(3 * components);
+    expect_sound(c, finer);
+  }
+}
+
 TEST(Decomposition, MoreComponentsThanDomainsArePacked) {
   mesh::TriangleMesh pieces = testing::grid_mesh(5, 5);
   for (int i = 0; i < 4; ++i) pieces = testing::disjoint_union(pieces, testing::grid_mesh(5, 5));

@@ -45,7 +45,7 @@ mesh::Adjacency corners_of_vertices(const model::ClothModel& model) {
 JacobiStep::JacobiStep(const model::ClothModel& model, double h)
     : model_(model),
       inverse_h_sq_(1.0 / (h * h)),
-      corner_force_(2 * static_cast<Eigen::Index>(model.stretch.size()), 3),
+      corner_force_(3 * static_cast<Eigen::Index>(model.stretch.size()), 3),
       bend_force_(static_cast<Eigen::Index>(model.bend.size()), 3),
       vertex_corners_(corners_of_vertices(model)) {
   bend_begin_.assign(static_cast<std::size_t>(model.num_vertices()) + 1, 0);
@@ -84,9 +84,12 @@ JacobiStep::Sum JacobiStep::project_triangle(std::size_t t, const Positions& x,
     R = model::closest_isometry_degenerate(F,
                                            reference_isometry(c, *problem.previous, model_.start));
   const Mat32 stress = c.weight * (F - R);
-  const auto row = 2 * static_cast<Eigen::Index>(t);
-  corner_force_.row(row) = c.rest_inverse.row(0) * stress.transpose();
-  corner_force_.row(row + 1) = c.rest_inverse.row(1) * stress.transpose();
+  const auto row = 3 * static_cast<Eigen::Index>(t);
+  const Eigen::RowVector3d force1 = c.rest_inverse.row(0) * stress.transpose();
+  const Eigen::RowVector3d force2 = c.rest_inverse.row(1) * stress.transpose();
+  corner_force_.row(row) = -(force1 + force2);
+  corner_force_.row(row + 1) = force1;
+  corner_force_.row(row + 2) = force2;
   return {0.5 * c.weight * (F - R).squaredNorm(), degenerate};
 }
 
@@ -115,20 +118,8 @@ double JacobiStep::gather(std::size_t v, const Positions& x, const model::StepPr
   const Vec3 offset = (x.row(row) - problem.predicted->row(row)).transpose();
   const double inertia = model_.mass[row] * inverse_h_sq_;
   Vec3 force = inertia * offset;
-  for (int k = vertex_corners_.begin[v]; k < vertex_corners_.begin[v + 1]; ++k) {
-    const int item = vertex_corners_.item[static_cast<std::size_t>(k)];
-    const Eigen::Index first = 2 * (item / 3);
-    switch (item % 3) {
-      case 0:
-        force -= (corner_force_.row(first) + corner_force_.row(first + 1)).transpose();
-        break;
-      case 1:
-        force += corner_force_.row(first).transpose();
-        break;
-      default:
-        force += corner_force_.row(first + 1).transpose();
-    }
-  }
+  for (int k = vertex_corners_.begin[v]; k < vertex_corners_.begin[v + 1]; ++k)
+    force += corner_force_.row(vertex_corners_.item[static_cast<std::size_t>(k)]).transpose();
   for (int k = bend_begin_[v]; k < bend_begin_[v + 1]; ++k) {
     const BendUse& use = bend_use_[static_cast<std::size_t>(k)];
     force += use.coefficient * bend_force_.row(use.constraint).transpose();

@@ -53,7 +53,7 @@ class JacobiStep {
 
   const model::ClothModel& model_;
   double inverse_h_sq_;
-  Positions corner_force_;          ///< per triangle corner 1 and 2 (corner 0 balances them), N
+  Positions corner_force_;          ///< per triangle, three rows: force on each corner, N
   Positions bend_force_;            ///< per bending constraint, w (c^T x - y), N
   mesh::Adjacency vertex_corners_;  ///< per vertex: 3 * triangle + corner
   std::vector<int> bend_begin_;     ///< per vertex: offsets into bend_use_

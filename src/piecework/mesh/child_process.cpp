@@ -19,6 +19,7 @@
 
 #include <fmt/format.h>
 
+#include <piecework/core/descriptor.hpp>
 #include <piecework/core/error.hpp>
 
 namespace piecework::mesh {
@@ -35,21 +36,6 @@ constexpr char kResult = 'R';
 constexpr char kBadInput = 'I';
 constexpr char kNoMemory = 'M';
 constexpr char kException = 'X';
-
-/// A POSIX descriptor closed on every path out.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 void limit(__rlimit_resource resource, rlim_t value) {
   const rlimit both{value, value};

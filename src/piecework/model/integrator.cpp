@@ -27,8 +27,10 @@ Integrator::Integrator(const ClothModel& model, ExternalForces forces, std::vect
       forces_(model, std::move(forces)),
       pins_(std::move(pins), model.start),
       options_(options),
-      minimizer_(std::move(minimizer)) {
-  minimizer_->prepare(pins_.fixed_at(options_.h));
+      minimizer_(std::move(minimizer)) {}
+
+void Integrator::prepare(const State& state) {
+  minimizer_->prepare(pins_.fixed_at((state.step + 1) * options_.h));
 }
 
 State Integrator::initial_state(const std::vector<Vec3>& part_velocity) const {

@@ -22,11 +22,13 @@ struct IntegratorOptions {
 ///     v_{n+1} = (x_{n+1} - x_n) / h                                         [Lu25, Eq. 1]
 class Integrator {
  public:
-  /// Prepares the minimiser for the first step.
   /// \param model  must outlive the integrator.
-  /// \throws SimulationError as Minimizer::prepare().
   Integrator(const ClothModel& model, ExternalForces forces, std::vector<Pin> pins,
              IntegratorOptions options, std::unique_ptr<Minimizer> minimizer);
+
+  /// Set-up for the step after `state`, so that it is like the others. Optional.
+  /// \throws SimulationError as Minimizer::prepare().
+  void prepare(const State& state);
 
   /// One step. On an exception the state is as it was before.
   /// \throws SimulationError if the new state is not finite (the text says what to change).

@@ -50,6 +50,13 @@ struct StepReport {
   double step_ms = 0;
 };
 
+/// What a solver's set-up took. 0: it has no factor.
+struct SetupReport {
+  double ms = 0;
+  double factor_nonzeros = 0;  ///< nnz(L)
+  double factor_bytes = 0;
+};
+
 /// The minimisation problem of one implicit Euler step [Lu25, Eq. 1].
 struct StepProblem {
   const Positions* predicted;      ///< z = x_n + h v_n + h^2 M^-1 f_ext, |V| x 3, m
@@ -65,6 +72,9 @@ class Minimizer {
   /// Set-up for a set of held vertices, so that the first step is like the others. Optional.
   /// \throws SimulationError if K is not positive definite or its factor does not fit into memory.
   virtual void prepare(const std::vector<char>& fixed) = 0;
+
+  /// Of the last prepare().
+  [[nodiscard]] virtual SetupReport setup_report() const = 0;
 
   /// Improves x (in: start of the iteration, out: the step's end state).
   /// \throws SimulationError if x becomes non-finite or K is not positive definite; x is then void.

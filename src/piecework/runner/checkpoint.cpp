@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,8 @@
 
 namespace piecework::runner {
 namespace {
+
+namespace fs = std::filesystem;
 
 static_assert(std::endian::native == std::endian::little, "the format is little-endian");
 
@@ -34,22 +37,39 @@ std::size_t state_bytes(std::int64_t vertices) {
 
 }  // namespace
 
-std::string motion_hash(const scene::Scene& scene) {
+std::string scene_hash(const scene::Scene& scene) {
   scene::Scene motion = scene;
   motion.name.clear();
   motion.description.clear();
   motion.source.clear();
   motion.solver.threads = 0;
-  motion.step.steps = 1;
-  motion.step.output_every = 1;
+  motion.step.steps = motion.step.output_every;
   motion.camera = {};
   motion.render = {};
   motion.expect.clear();
+  for (scene::Cloth& cloth : motion.cloths) {
+    cloth.mesh.file = fs::path(cloth.mesh.file).filename().string();
+    cloth.rest_file = fs::path(cloth.rest_file).filename().string();
+  }
   return Hash().add(scene::resolved_json(motion)).hex();
 }
 
-void write_state(const std::filesystem::path& path, const model::State& state,
-                 const std::string& hash) {
+std::string motion_hash(const World& world) {
+  const model::ClothModel& model = world.model;
+  Hash hash;
+  hash.add(scene_hash(world.scene));
+  hash.add(std::span(model.start.data(), static_cast<std::size_t>(model.start.size())));
+  hash.add(std::span(model.triangles));
+  for (const model::StretchConstraint& c : model.stretch)
+    hash.add(std::span(c.rest_inverse.data(), 4)).add(std::span(&c.weight, 1));
+  for (const model::BendConstraint& c : model.bend)
+    hash.add(std::span(&c.weight, 1)).add(std::span(&c.rest_length, 1));
+  for (const model::Pin& pin : world.pins) hash.add(std::span(pin.vertices));
+  for (const model::Load& load : world.forces.loads) hash.add(std::span(load.vertices));
+  return hash.hex();
+}
+
+void write_state(const fs::path& path, const model::State& state, const std::string& hash) {
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   std::memcpy(header.hash, hash.data(), std::min(hash.size(), sizeof header.hash));
@@ -66,8 +86,7 @@ void write_state(const std::filesystem::path& path, const model::State& state,
   write_file_atomically(path, content);
 }
 
-model::State read_state(const std::filesystem::path& path, const std::string& hash,
-                        int num_vertices) {
+model::State read_state(const fs::path& path, const std::string& hash, int num_vertices) {
   const std::string content = read_file(path);
   const auto damaged = [&](const char* what) {
     return InputError(fmt::format("{}: {}; delete it, or run with --overwrite to start anew",

@@ -7,13 +7,18 @@
 #include <string>
 
 #include <piecework/model/stepper.hpp>
-#include <piecework/scene/scene.hpp>
+#include <piecework/runner/world.hpp>
 
 namespace piecework::runner {
 
-/// Hash of what determines the motion: the resolved scene without threads, length, pictures and
-/// expectations. A checkpoint may be continued under another number of threads or steps.
-std::string motion_hash(const scene::Scene& scene);
+/// Hash of what the scene's text says about the motion: the resolved scene without threads, length,
+/// pictures, expectations and the places of its mesh files. A run may be continued under another
+/// number of threads or steps.
+std::string scene_hash(const scene::Scene& scene);
+
+/// Hash of what determines the motion: scene_hash() and the meshes themselves (start and rest
+/// shapes, triangles, held vertices).
+std::string motion_hash(const World& world);
 
 /// Writes step, time, x and v (double, bit for bit) with the scene's motion hash and a checksum.
 /// \throws OutputError.

@@ -71,17 +71,37 @@ TEST_F(Checkpoint, RefusesEveryKindOfDamage) {
   expect_refused("not a saved state");
 }
 
+std::string hash_with(const std::vector<scene::Override>& overrides) {
+  return motion_hash(*build_world(small_scene(overrides)));
+}
+
 TEST(MotionHash, SeesPhysicsAndOnlyPhysics) {
-  const std::string base = motion_hash(small_scene());
-  for (const char* key : {"solver.threads", "step.steps", "step.output_every"})
-    EXPECT_EQ(motion_hash(small_scene({{key, "2"}})), base) << key;
-  EXPECT_EQ(motion_hash(
-                small_scene({{"render.color", "strain"}, {"camera.fov", "50"}, {"name", "other"}})),
-            base);
-  EXPECT_NE(motion_hash(small_scene({{"step.h", "0.02"}})), base);
-  EXPECT_NE(motion_hash(small_scene({{"materials.cotton.density", "0.6"}})), base);
-  EXPECT_NE(motion_hash(small_scene({{"quality.max_iterations", "7"}})), base);
-  EXPECT_NE(motion_hash(small_scene({{"cloths.0.mesh.columns", "9"}})), base);
+  const std::string base = hash_with({});
+  for (const char* key : {"solver.threads", "step.steps"})
+    EXPECT_EQ(hash_with({{key, "2"}}), base) << key;
+  EXPECT_EQ(hash_with({{"render.color", "strain"}, {"camera.fov", "50"}, {"name", "other"}}), base);
+  EXPECT_NE(hash_with({{"step.h", "0.02"}}), base);
+  EXPECT_NE(hash_with({{"step.output_every", "2"}}), base) << "frames are counted by it";
+  EXPECT_NE(hash_with({{"materials.cotton.density", "0.6"}}), base);
+  EXPECT_NE(hash_with({{"quality.max_iterations", "7"}}), base);
+  EXPECT_NE(hash_with({{"cloths.0.mesh.columns", "9"}}), base);
+}
+
+// The same scene text over another mesh is another motion; the same mesh elsewhere is not.
+TEST(MotionHash, SeesTheMeshAndNotItsPlace) {
+  const TemporaryFolder folder;
+  const auto hash_of = [&](const char* name, const char* obj) {
+    std::filesystem::create_directories(folder.path() / name);
+    const auto path = folder.path() / name / "m.obj";
+    write_file_atomically(path, obj);
+    return motion_hash(*build_world(scene::parse_scene(
+        R"({"name": "t", "materials": {"m": {}}, "cloths": [{"material": "m", "mesh": {"file": ")" +
+            path.string() + R"("}}]})",
+        "t.json")));
+  };
+  const std::string base = hash_of("a", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 3 2\n");
+  EXPECT_EQ(hash_of("b", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 3 2\n"), base);
+  EXPECT_NE(hash_of("a", "v 0 0 0\nv 1 0 0\nv 0 0 2\nf 1 3 2\n"), base);
 }
 
 }  // namespace

@@ -101,21 +101,21 @@ ExpectationChecker::ExpectationChecker(const World& world) : world_(world) {
 
 void ExpectationChecker::observe(const model::State& state,
                                  const std::vector<FrameRecord>& frames) {
-  const double half_step = 0.5 * world_.scene.step.h;
+  const double half_step = 0.5000001 * world_.scene.step.h;
   for (Item& item : items_)
-    if (!item.done && item.expectation->at && state.time > *item.expectation->at - half_step)
+    if (!item.result.reached && item.expectation->at &&
+        std::abs(state.time - *item.expectation->at) <= half_step)
       evaluate(item, state, frames);
 }
 
 void ExpectationChecker::finish(const model::State& state, const std::vector<FrameRecord>& frames) {
   for (Item& item : items_)
-    if (!item.done && !item.expectation->at) evaluate(item, state, frames);
+    if (!item.result.reached && !item.expectation->at) evaluate(item, state, frames);
 }
 
 std::vector<ExpectationResult> ExpectationChecker::results() const {
   std::vector<ExpectationResult> results;
-  for (const Item& item : items_)
-    if (item.done) results.push_back(item.result);
+  for (const Item& item : items_) results.push_back(item.result);
   return results;
 }
 
@@ -124,14 +124,13 @@ void ExpectationChecker::restore(const std::vector<ExpectationResult>& results) 
     for (const ExpectationResult& result : results) {
       if (!item.expectation->at || result.text != item.result.text) continue;
       item.result = result;
-      item.done = true;
     }
 }
 
 void ExpectationChecker::evaluate(Item& item, const model::State& state,
                                   const std::vector<FrameRecord>& frames) const {
   const scene::Expectation& e = *item.expectation;
-  item.done = true;
+  item.result.reached = true;
   item.result.value = measure(item, state, frames);
   const double infinity = std::numeric_limits<double>::infinity();
   item.result.holds = item.result.value >= e.min.value_or(-infinity) &&

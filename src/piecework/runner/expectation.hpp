@@ -21,7 +21,7 @@ class ExpectationChecker {
   /// Evaluates what is due at the end.
   void finish(const model::State& state, const std::vector<FrameRecord>& frames);
 
-  /// What was evaluated so far, in the scene's order.
+  /// All results in the scene's order; those whose time did not come are not reached.
   [[nodiscard]] std::vector<ExpectationResult> results() const;
 
   /// Takes over results of an earlier part of the run, recognised by their text.
@@ -30,9 +30,8 @@ class ExpectationChecker {
  private:
   struct Item {
     const scene::Expectation* expectation;
-    int part = -1;    ///< -1: all cloths
-    int vertex = -1;  ///< of the model
-    bool done = false;
+    int part = -1;             ///< -1: all cloths
+    int vertex = -1;           ///< of the model
     ExpectationResult result;  ///< its text is always there
   };
   void evaluate(Item& item, const model::State& state,

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <piecework/core/parallel.hpp>
 #include <piecework/core/statistics.hpp>
 #include <piecework/runner/record.hpp>
 
@@ -27,6 +28,13 @@ std::string three_digits(double value) {
 }
 
 std::string milliseconds(double value) { return value < 0 ? kOff : three_digits(value); }
+
+/// A name that cannot break a table.
+std::string plain_cell(const std::string& name) {
+  std::string text;
+  for (const char c : name) text += c == '|' ? std::string("\\|") : std::string(1, c);
+  return text;
+}
 
 using Column = std::function<double(const FrameRecord&)>;
 
@@ -52,6 +60,18 @@ std::string median_cell(const std::vector<double>& v) {
                      three_digits(m.high));
 }
 
+double fastest(const RunRecord& record) {
+  double ms = record.frames.front().step_min_ms;
+  for (const FrameRecord& frame : record.frames) ms = std::min(ms, frame.step_min_ms);
+  return ms;
+}
+
+double slowest(const RunRecord& record) {
+  double ms = 0;
+  for (const FrameRecord& frame : record.frames) ms = std::max(ms, frame.step_max_ms);
+  return ms;
+}
+
 /// The columns of the paper's Table 1; what this run does not have is "-".
 std::string table_one(const RunRecord& record, const World& world) {
   const auto phase = [&](double model::PhaseTimes::*member) {
@@ -73,20 +93,31 @@ std::string table_one(const RunRecord& record, const World& world) {
   text += fmt::format(
       "| {} | {} | {} | {} | {}\\|{}\\|{} | {} | - | - | {} | {} | {} | - | - | {} | {} | {} | {} "
       "| {} |\n",
-      world.scene.name, s.domains, 3 * world.model.num_vertices(), world.model.triangles.size(),
-      s.corner, s.boundary, s.remainder, three_digits(iterations), phase(&model::PhaseTimes::local),
-      phase(&model::PhaseTimes::global), phase(&model::PhaseTimes::refactor),
-      phase(&model::PhaseTimes::misc), three_digits(*std::min_element(steps.begin(), steps.end())),
-      three_digits(*std::max_element(steps.begin(), steps.end())), three_digits(median.median),
+      plain_cell(world.scene.name), s.domains, 3 * world.model.num_vertices(),
+      world.model.triangles.size(), s.corner, s.boundary, s.remainder, three_digits(iterations),
+      phase(&model::PhaseTimes::local), phase(&model::PhaseTimes::global),
+      phase(&model::PhaseTimes::refactor), phase(&model::PhaseTimes::misc),
+      three_digits(fastest(record)), three_digits(slowest(record)), three_digits(median.median),
       three_digits(mean(steps)));
   return text;
+}
+
+/// Phases may leave 5 % of the run unexplained, and may not exceed it.
+bool phases_explain(const RunRecord& record) {
+  double other = 0;
+  double total = 0;
+  for (const FrameRecord& frame : record.frames) {
+    other += frame.other_ms() * frame.steps;
+    total += frame.step_ms * frame.steps;
+  }
+  return other >= -1e-9 * total && other <= 0.05 * total;
 }
 
 std::string phase_table(const RunRecord& record) {
   const std::vector<double> steps = values(record, [](const FrameRecord& f) { return f.step_ms; });
   const double total = std::accumulate(steps.begin(), steps.end(), 0.0);
   std::string text = fmt::format(
-      "| Phase | ms per step, median [95 % interval] | mean | share | n "
+      "| Phase | ms per step, median [95 % interval, from 6 frames on] | mean | share | n "
       "|\n|:--|--:|--:|--:|--:|\n");
   const auto row = [&](const char* name, const Column& column) {
     const std::vector<double> v = values(record, column);
@@ -99,7 +130,8 @@ std::string phase_table(const RunRecord& record) {
   row("Global step (G)", [](const FrameRecord& f) { return f.phases.global; });
   row("Refactorisation (Ref.)", [](const FrameRecord& f) { return f.phases.refactor; });
   row("Forces, prediction, velocities (Misc.)", [](const FrameRecord& f) { return f.phases.misc; });
-  row("Other", [](const FrameRecord& f) { return std::max(0.0, f.other_ms()); });
+  row(phases_explain(record) ? "Other" : "Other **FAIL**: the phases do not add up to the step",
+      [](const FrameRecord& f) { return std::max(0.0, f.other_ms()); });
   row("**Step**", [](const FrameRecord& f) { return f.step_ms; });
   return text;
 }
@@ -146,12 +178,19 @@ std::string environment_list(const RunRecord& record) {
   return text;
 }
 
+/// What was not as in the scene's file.
+std::string overrides_line(const RunRecord& record) {
+  std::string text = "Changed for this run:";
+  for (const auto& [key, value] : record.overrides) text += fmt::format(" `{}={}`", key, value);
+  return text + "\n";
+}
+
 std::string expectation_table(const RunRecord& record) {
   if (record.expectations.empty()) return "";
   std::string text = "\n## Expectations\n\n| Expectation | found | |\n|:--|--:|:--|\n";
   for (const ExpectationResult& e : record.expectations)
-    text += fmt::format("| {} | {} | {} |\n", e.text, three_digits(e.value),
-                        e.holds ? "holds" : "**FAIL**");
+    text += fmt::format("| {} | {} | {} |\n", e.text, e.reached ? three_digits(e.value) : kOff,
+                        e.holds ? "holds" : (e.reached ? "**FAIL**" : "not reached"));
   return text;
 }
 
@@ -161,16 +200,20 @@ std::string to_markdown(const RunRecord& record, const World& world) {
   std::string text = fmt::format("# {}\n\n", world.scene.name);
   if (!world.scene.description.empty()) text += world.scene.description + "\n\n";
   if (record.frames.empty()) return text + "No step was simulated.\n";
-  const bool disturbed = record.load_before > 0.5 * record.threads;
+  const bool disturbed = record.load_before > 0.5 * available_threads();
   text += fmt::format("{}, {} threads, h = {:.6g} s. Times in ms per step{}.\n\n", record.method,
                       record.threads, world.scene.step.h, disturbed ? " †" : "");
+  if (!record.overrides.empty()) text += overrides_line(record) + "\n";
   text += table_one(record, world);
   text += "\n" + phase_table(record);
   text += "\n" + accuracy_table(record);
   text += "\n" + convergence_line(record, world);
   text += fmt::format("Set-up: load {} ms, domains {} ms, analysis and factorisation {} ms.\n",
                       three_digits(world.load_ms), three_digits(world.partition_ms),
-                      three_digits(record.setup_ms));
+                      three_digits(record.setup.ms));
+  if (record.setup.factor_nonzeros > 0)
+    text += fmt::format("Factor: {} nonzeros, {} MB.\n", three_digits(record.setup.factor_nonzeros),
+                        three_digits(record.setup.factor_bytes / 1e6));
   if (disturbed) text += "\n† Disturbed: other work loaded the machine when the run began.\n";
   for (const std::string& note : world.notes) text += fmt::format("\nNote: {}.\n", note);
   text += expectation_table(record);

@@ -39,6 +39,8 @@ Json frame_json(const FrameRecord& frame) {
           {"time_s", frame.time},
           {"steps", frame.steps},
           {"step_ms", frame.step_ms},
+          {"step_ms_min", frame.step_min_ms},
+          {"step_ms_max", frame.step_max_ms},
           {"phases_ms", phases},
           {"counters",
            {{"iterations", frame.iterations},
@@ -58,6 +60,8 @@ FrameRecord frame_from_json(const Json& json) {
   frame.time = json.at("time_s");
   frame.steps = json.at("steps");
   frame.step_ms = json.at("step_ms");
+  frame.step_min_ms = json.at("step_ms_min");
+  frame.step_max_ms = json.at("step_ms_max");
   for (const auto& [key, member] : kPhases)
     if (json.at("phases_ms").contains(key)) frame.phases.*member = json.at("phases_ms").at(key);
   const Json& counters = json.at("counters");
@@ -89,7 +93,7 @@ Json scene_json(const RunRecord& record, const World& world) {
   Json overrides = Json::object();
   for (const auto& [key, value] : record.overrides) overrides[key] = value;
   return {{"name", world.scene.name},
-          {"motion_hash", record.scene_hash},
+          {"motion_hash", record.motion_hash},
           {"overrides", overrides},
           {"vertices", world.model.num_vertices()},
           {"dof", 3 * world.model.num_vertices()},
@@ -104,6 +108,8 @@ Json scene_json(const RunRecord& record, const World& world) {
 }  // namespace
 
 void FrameRecord::add(const model::StepReport& report) {
+  step_min_ms = steps == 0 ? report.step_ms : std::min(step_min_ms, report.step_ms);
+  step_max_ms = std::max(step_max_ms, report.step_ms);
   ++steps;
   step_ms += report.step_ms;
   for (const auto& [key, member] : kPhases) add_phase(phases.*member, report.phases.*member);
@@ -145,13 +151,18 @@ std::string to_json(const RunRecord& record, const World& world) {
   json["method"] = record.method;
   json["setup"] = {{"load_ms", world.load_ms},
                    {"partition_ms", world.partition_ms},
-                   {"factor_ms", record.setup_ms}};
+                   {"solver_ms", record.setup.ms},
+                   {"factor_nonzeros", record.setup.factor_nonzeros},
+                   {"factor_bytes", record.setup.factor_bytes}};
   json["notes"] = world.notes;
   json["frames"] = Json::array();
   for (const FrameRecord& frame : record.frames) json["frames"].push_back(frame_json(frame));
   json["expectations"] = Json::array();
   for (const ExpectationResult& e : record.expectations)
-    json["expectations"].push_back({{"text", e.text}, {"value", e.value}, {"holds", e.holds}});
+    json["expectations"].push_back({{"text", e.text},
+                                    {"reached", e.reached},
+                                    {"value", e.reached ? Json(e.value) : Json()},
+                                    {"holds", e.holds}});
   return json.dump(1) + "\n";
 }
 
@@ -164,7 +175,8 @@ RecordedPart recorded_part(std::string_view text, const std::string& source, int
       part.frames.push_back(frame_from_json(frame));
     }
     for (const Json& e : json.at("expectations"))
-      part.expectations.push_back({e.at("text"), e.at("value"), e.at("holds")});
+      if (e.at("reached").get<bool>())
+        part.expectations.push_back({e.at("text"), true, e.at("value"), e.at("holds")});
   } catch (const Json::exception& error) {
     throw InputError(
         fmt::format("{}: not a run record of this version ({}); run with --overwrite to start anew",

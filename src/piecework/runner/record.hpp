@@ -21,6 +21,7 @@ struct FrameRecord {
   double time = 0;  ///< s
   int steps = 0;    ///< steps in this frame
   double step_ms = 0;
+  double step_min_ms = 0, step_max_ms = 0;  ///< fastest and slowest of its steps
   model::PhaseTimes phases;
   int iterations = 0;
   int global_solves = 0;
@@ -40,18 +41,19 @@ struct FrameRecord {
 
 /// One line of the scene's `expect` with what was found.
 struct ExpectationResult {
-  std::string text;  ///< "lowest_y at 0.5 s within [-2.5, -0.7]"
+  std::string text;      ///< "lowest_y at 0.5 s within [-2.5, -0.7]"
+  bool reached = false;  ///< false: the run ended before its time, and it does not hold
   double value = 0;
   bool holds = false;
 };
 
 struct RunRecord {
   std::string environment_json;  ///< from environment.hpp
-  std::string scene_hash;
+  std::string motion_hash;
   std::vector<std::pair<std::string, std::string>> overrides;
   std::string method;  ///< Minimizer::description()
   int threads = 1;
-  double setup_ms = 0;  ///< analysis and factorisation before the first step
+  model::SetupReport setup;  ///< of the solver, before the first step
   std::vector<FrameRecord> frames;
   std::vector<ExpectationResult> expectations;
   double load_before = 0, load_after = 0;  ///< 1-minute load averages

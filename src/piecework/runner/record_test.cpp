@@ -20,8 +20,10 @@ RunRecord some_record(int frames, bool refactor) {
     FrameRecord frame;
     model::StepReport report;
     report.step_ms = 10.0 + i;
-    report.phases = {
-        .local = 4.0, .global = 5.0, .refactor = (refactor && i == 2) ? 1.5 : -1.0, .misc = 0.5};
+    report.phases = {.local = 4.3 + i,
+                     .global = 5.0,
+                     .refactor = (refactor && i == 2) ? 1.5 : -1.0,
+                     .misc = 0.5};
     report.iterations = 7;
     report.converged = true;
     report.gradient = 1e-3 * i;
@@ -60,7 +62,8 @@ TEST(FrameRecord, MeansOverItsSteps) {
 TEST(Record, JsonKeepsFramesForAContinuedRun) {
   const auto world = build_world(small_scene());
   RunRecord record = some_record(5, true);
-  record.expectations = {{"lowest_y at 0.03 s: any to 0", -0.2, true}};
+  record.expectations = {{"lowest_y at 0.03 s: any to 0", true, -0.2, true},
+                         {"center_y at the end", false, 0, false}};
   const RecordedPart part = recorded_part(to_json(record, *world), "run.json", 4);
   ASSERT_EQ(part.frames.size(), 4U);
   EXPECT_EQ(part.frames[3].step_ms, record.frames[3].step_ms);

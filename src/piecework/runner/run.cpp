@@ -1,11 +1,16 @@
 #include <piecework/runner/run.hpp>
 
+#include <fcntl.h>
+#include <sys/file.h>
+
 #include <algorithm>
+#include <optional>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include <piecework/core/atomic_file.hpp>
-#include <piecework/core/clock.hpp>
+#include <piecework/core/descriptor.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/runner/checkpoint.hpp>
@@ -22,10 +27,21 @@ constexpr const char* kResolvedScene = "scene.resolved.json";
 constexpr const char* kRecord = "run.json";
 constexpr const char* kCheckpoint = "checkpoint.bin";
 
+/// "frame_0007.ply" and the like: what a run or a drawing of it writes for each frame.
+bool is_frame_file(const std::string& name) {
+  constexpr std::string_view kPrefix = "frame_";
+  if (!name.starts_with(kPrefix)) return false;
+  const auto dot = name.find('.');
+  if (dot == std::string::npos) return false;
+  const std::string number = name.substr(kPrefix.size(), dot - kPrefix.size());
+  const std::string kind = name.substr(dot + 1);
+  return number.size() >= 4 && number.find_first_not_of("0123456789") == std::string::npos &&
+         (kind == "png" || kind == "ply" || kind == "obj" || kind == "vtp" || kind == "bin");
+}
+
 bool is_run_file(const std::string& name) {
-  return name.starts_with("frame_") || name == kResolvedScene || name == kRecord ||
-         name == kCheckpoint || name == "timings.csv" || name == "summary.md" ||
-         name == "contact_sheet.png";
+  return is_frame_file(name) || name == kResolvedScene || name == kRecord || name == kCheckpoint ||
+         name == "timings.csv" || name == "summary.md" || name == "contact_sheet.png";
 }
 
 /// Removes what an earlier run wrote, and nothing else.
@@ -34,7 +50,7 @@ void clear_run(const fs::path& directory) {
   for (const auto& entry : fs::directory_iterator(directory, ignored))
     if (is_run_file(entry.path().filename().string())) fs::remove(entry.path(), ignored);
   for (const auto& entry : fs::directory_iterator(directory / "state", ignored))
-    if (entry.path().filename().string().starts_with("frame_")) fs::remove(entry.path(), ignored);
+    if (is_frame_file(entry.path().filename().string())) fs::remove(entry.path(), ignored);
 }
 
 /// Removes temporary files that a killed run could not rename: "frame_0003.ply.tmp4711".
@@ -49,11 +65,20 @@ void clear_temporaries(const fs::path& directory) {
   }
 }
 
+/// A directory that is not a run of this scene must not become one by accident.
 void refuse_other_scene(const fs::path& directory, const std::string& hash) {
   const fs::path path = directory / kResolvedScene;
-  if (!fs::exists(path)) return;
+  if (!fs::exists(path)) {
+    for (const char* name : {kRecord, kCheckpoint, "timings.csv", "summary.md"})
+      if (fs::exists(directory / name))
+        throw InputError(
+            fmt::format("{}: has a {} that no run of ours wrote; choose another "
+                        "directory with -o, or replace it with --overwrite",
+                        directory.string(), name));
+    return;
+  }
   const scene::Scene other = scene::load_scene(path);
-  if (motion_hash(other) == hash) return;
+  if (scene_hash(other) == hash) return;
   throw InputError(
       fmt::format("{}: holds a run of another scene (\"{}\" or other values); choose another "
                   "directory with -o, or replace it with --overwrite",
@@ -65,7 +90,7 @@ class Run {
  public:
   Run(const scene::Scene& scene, const RunOptions& options, RunObserver& observer)
       : options_(options), observer_(observer), world_(build_world(scene)), expectations_(*world_) {
-    record_.scene_hash = motion_hash(scene);
+    record_.motion_hash = motion_hash(*world_);
     record_.overrides = options.overrides;
     record_.environment_json = to_json(describe_environment());
     record_.load_before = load_average();
@@ -75,11 +100,11 @@ class Run {
   RunOutcome execute(int threads) {
     record_.threads = threads;
     prepare_directory();
-    Stopwatch watch;
     integrator_ = make_integrator(*world_);
-    record_.setup_ms = watch.elapsed_ms();
     record_.method = integrator_->minimizer().description();
     load_or_start();
+    integrator_->prepare(state_);
+    record_.setup = integrator_->minimizer().setup_report();
     observer_.started(*world_, frame_, frames_);
     if (frame_ == 0) {
       emit(nullptr);
@@ -89,12 +114,13 @@ class Run {
     while (frame_ < frames_ && !outcome.stopped) {
       simulate_frame();
       if (options_.checkpoint_every > 0 && frame_ % options_.checkpoint_every == 0) save();
-      outcome.stopped = observer_.should_stop();
+      outcome.stopped = frame_ < frames_ && observer_.should_stop();
     }
     if (!outcome.stopped) expectations_.finish(state_, record_.frames);
     record_.expectations = expectations_.results();
-    // A run that was complete before keeps its reports; one that ends now gets its expectations.
-    if (frame_ == 0 || simulated_) save();
+    // A run that was complete before keeps its reports, unless it was killed before their end.
+    if (frame_ == 0 || simulated_ || !reports_complete_) save();
+    outcome.simulated = simulated_;
     outcome.frames_done = frame_;
     outcome.record = record_;
     integrator_.reset();  // refers to the world
@@ -105,14 +131,25 @@ class Run {
  private:
   void prepare_directory() {
     ensure_directory(options_.directory);
+    lock_directory();
     if (options_.overwrite)
       clear_run(options_.directory);
     else
-      refuse_other_scene(options_.directory, record_.scene_hash);
+      refuse_other_scene(options_.directory, scene_hash(world_->scene));
     if (options_.save_states) ensure_directory(options_.directory / "state");
     clear_temporaries(options_.directory);
     clear_temporaries(options_.directory / "state");
     write_file_atomically(options_.directory / kResolvedScene, scene::resolved_json(world_->scene));
+  }
+
+  /// One run at a time: the lock goes with the process, however it ends.
+  void lock_directory() {
+    lock_.emplace(::open(options_.directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (lock_->get() >= 0 && ::flock(lock_->get(), LOCK_EX | LOCK_NB) != 0)
+      throw InputError(
+          fmt::format("{}: another run is writing into it; wait for it, or choose "
+                      "another directory with -o",
+                      options_.directory.string()));
   }
 
   void load_or_start() {
@@ -123,16 +160,18 @@ class Run {
         world_->notes.push_back("no checkpoint to resume from: started at frame 0");
       return;
     }
-    state_ = read_state(checkpoint, record_.scene_hash, world_->model.num_vertices());
+    state_ = read_state(checkpoint, record_.motion_hash, world_->model.num_vertices());
     const fs::path path = options_.directory / kRecord;
     RecordedPart part = recorded_part(read_file(path), path.string(), state_.step);
     record_.frames = std::move(part.frames);
     expectations_.restore(part.expectations);
+    reports_complete_ = part.expectations.size() == world_->scene.expect.size();
     frame_ = record_.frames.empty() ? 0 : record_.frames.back().frame;
     if ((record_.frames.empty() ? 0 : record_.frames.back().step) != state_.step)
       throw InputError(fmt::format(
           "{}: does not reach the checkpoint's step {}; run with --overwrite to start anew",
           path.string(), state_.step));
+    export_earlier_frames();
   }
 
   void simulate_frame() {
@@ -156,24 +195,49 @@ class Run {
   void emit(const FrameRecord* frame) {
     if (options_.save_states)
       write_state(options_.directory / "state" / (frame_name(frame_) + ".bin"), state_,
-                  record_.scene_hash);
-    if (!options_.exports.empty()) export_frame();
+                  record_.motion_hash);
+    export_frame(frame_, state_.x);
     observer_.frame_done(*world_, state_, frame_, frame);
   }
 
-  void export_frame() {
+  void export_frame(int frame, const Positions& x) {
+    for (const mesh::ExportFormat format : options_.exports)
+      mesh::export_meshes(export_path(frame, format), format, export_parts(x));
+  }
+
+  [[nodiscard]] fs::path export_path(int frame, mesh::ExportFormat format) const {
+    return options_.directory / (frame_name(frame) + "." + mesh::extension(format));
+  }
+
+  [[nodiscard]] std::vector<mesh::ExportPart> export_parts(const Positions& x) const {
     std::vector<mesh::ExportPart> parts;
     for (std::size_t p = 0; p < world_->documents.size(); ++p) {
       const auto& range = world_->model.parts[p];
       const auto first = world_->domains.triangle_domain.begin() + range.first_triangle;
       parts.push_back({.document = &world_->documents[p],
-                       .positions = state_.x.middleRows(range.first_vertex, range.num_vertices),
+                       .positions = x.middleRows(range.first_vertex, range.num_vertices),
                        .name = range.name,
                        .triangle_domain = {first, first + range.num_triangles}});
     }
-    for (const mesh::ExportFormat format : options_.exports)
-      mesh::export_meshes(options_.directory / (frame_name(frame_) + "." + mesh::extension(format)),
-                          format, parts);
+    return parts;
+  }
+
+  /// A continued run may ask for formats that its first part did not: made from the saved states.
+  void export_earlier_frames() {
+    for (int frame = 0; frame <= frame_; ++frame) {
+      const fs::path saved = options_.directory / "state" / (frame_name(frame) + ".bin");
+      for (const mesh::ExportFormat format : options_.exports) {
+        if (fs::exists(export_path(frame, format))) continue;
+        if (!fs::exists(saved))
+          throw InputError(
+              fmt::format("{}: frame {} cannot be exported as {} any more, its state "
+                          "was not kept; run with --overwrite to start anew",
+                          options_.directory.string(), frame, mesh::extension(format)));
+        const model::State state =
+            read_state(saved, record_.motion_hash, world_->model.num_vertices());
+        mesh::export_meshes(export_path(frame, format), format, export_parts(state.x));
+      }
+    }
   }
 
   void write_reports() {
@@ -187,7 +251,7 @@ class Run {
   /// The record first, so that a checkpoint never knows more frames than the record.
   void save() {
     write_reports();
-    write_state(options_.directory / kCheckpoint, state_, record_.scene_hash);
+    write_state(options_.directory / kCheckpoint, state_, record_.motion_hash);
   }
 
   /// After a failed step: frames that are complete keep their record; the checkpoint stays where
@@ -196,6 +260,7 @@ class Run {
 
   const RunOptions& options_;
   RunObserver& observer_;
+  std::optional<Descriptor> lock_;
   std::unique_ptr<World> world_;
   ExpectationChecker expectations_;
   std::unique_ptr<model::Integrator> integrator_;
@@ -204,6 +269,7 @@ class Run {
   int frame_ = 0;
   int frames_ = 0;
   bool simulated_ = false;
+  bool reports_complete_ = false;  ///< on disk, with every expectation
 };
 
 }  // namespace

@@ -30,7 +30,7 @@ struct RunOptions {
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  /// The scene is built; simulation starts after frame `first_frame` of `frames`.
+  /// The scene is built; simulation starts after frame `first_frame` of `frames`. May throw.
   virtual void started(const World& world, int first_frame, int frames) = 0;
   /// A frame is complete (frame 0: the start state; record is null then).
   virtual void frame_done(const World& world, const model::State& state, int frame,
@@ -40,8 +40,9 @@ class RunObserver {
 };
 
 struct RunOutcome {
-  int frames_done = 0;   ///< in the directory now, frame 0 not counted
-  bool stopped = false;  ///< the observer asked for it
+  int frames_done = 0;     ///< in the directory now, frame 0 not counted
+  bool stopped = false;    ///< the observer asked for it before the last frame
+  bool simulated = false;  ///< at least one frame was simulated now
   RunRecord record;
   std::unique_ptr<const World> world;  ///< never null
   [[nodiscard]] bool expectations_hold() const;

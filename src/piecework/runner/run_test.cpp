@@ -66,7 +66,8 @@ TEST(Run, RecordHasEverythingAndPhasesSumToTheStep) {
   for (const auto& frame : json.at("frames")) {
     double sum = 0;
     for (const auto& [phase, ms] : frame.at("phases_ms").items()) sum += ms.get<double>();
-    EXPECT_NEAR(sum, frame.at("step_ms").get<double>(), 1e-9);
+    EXPECT_NEAR(sum, frame.at("step_ms").get<double>(), 1e-9) << "`other` closes the sum";
+    EXPECT_LE(frame.at("step_ms_min").get<double>(), frame.at("step_ms_max").get<double>());
     EXPECT_GE(frame.at("phases_ms").at("other").get<double>(), 0);
     EXPECT_FALSE(frame.at("phases_ms").contains("refactor")) << "a phase that is off has no key";
     EXPECT_EQ(frame.at("counters").at("iterations"), 6);
@@ -163,7 +164,73 @@ TEST(Run, FailedStepKeepsWhatWasDone) {
                SimulationError);
   const auto json = nlohmann::json::parse(read_file(folder.path() / "run.json"));
   EXPECT_EQ(json.at("frames").size(), 2U);
-  EXPECT_EQ(read_state(folder.path() / "checkpoint.bin", motion_hash(scene), 56).step, 2);
+  EXPECT_EQ(read_state(folder.path() / "checkpoint.bin", motion_hash(*build_world(scene)), 56).step,
+            2);
+}
+
+TEST(Run, ContinuedRunExportsEarlierFramesToo) {
+  const TemporaryFolder folder;
+  Watcher watcher(3);
+  (void)simulate(folder.path(), watcher);
+  Watcher rest;
+  (void)simulate(folder.path(), rest, {.exports = {mesh::ExportFormat::Ply}});
+  for (int frame = 0; frame <= 8; ++frame)
+    EXPECT_TRUE(fs::exists(folder.path() / (frame_name(frame) + ".ply"))) << frame;
+  // Without saved states that is refused, not left out.
+  const TemporaryFolder stateless;
+  Watcher first(3);
+  (void)simulate(stateless.path(), first, {.save_states = false});
+  EXPECT_THROW((void)simulate(stateless.path(), rest, {.exports = {mesh::ExportFormat::Ply}}),
+               InputError);
+}
+
+TEST(Run, ExpectationsBeyondTheRunDoNotHold) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  const RunOutcome outcome = simulate(folder.path(), watcher, {.frames = 2});
+  ASSERT_EQ(outcome.record.expectations.size(), 2U);
+  EXPECT_FALSE(outcome.record.expectations[0].reached) << "0.03 s lies beyond two steps";
+  EXPECT_TRUE(outcome.record.expectations[1].reached);
+  EXPECT_FALSE(outcome.expectations_hold());
+}
+
+TEST(Run, TwoRunsDoNotMixInOneDirectory) {
+  const TemporaryFolder folder;
+  // While one run is in its first frame, another one tries.
+  class Intruder : public Watcher {
+   public:
+    explicit Intruder(const fs::path& directory) : directory_(directory) {}
+    void frame_done(const World& world, const model::State& state, int frame,
+                    const FrameRecord* record) override {
+      Watcher::frame_done(world, state, frame, record);
+      if (frame > 0) return;
+      Watcher second;
+      EXPECT_THROW((void)simulate(directory_, second, {.overwrite = true}), InputError);
+      ++tries;
+    }
+    int tries = 0;
+
+   private:
+    fs::path directory_;
+  };
+  Intruder intruder(folder.path());
+  EXPECT_EQ(simulate(folder.path(), intruder).frames_done, 8);
+  EXPECT_EQ(intruder.tries, 1);
+}
+
+TEST(Run, TakesOnlyItsOwnFiles) {
+  const TemporaryFolder folder;
+  Watcher watcher;
+  (void)simulate(folder.path(), watcher, {.frames = 1});
+  write_file_atomically(folder.path() / "frame_notes.txt", "mine");
+  write_file_atomically(folder.path() / "state" / "frame_plan.md", "mine");
+  (void)simulate(folder.path(), watcher, {.frames = 1, .overwrite = true});
+  EXPECT_TRUE(fs::exists(folder.path() / "frame_notes.txt"));
+  EXPECT_TRUE(fs::exists(folder.path() / "state" / "frame_plan.md"));
+  const TemporaryFolder foreign;
+  write_file_atomically(foreign.path() / "summary.md", "my own report");
+  EXPECT_THROW((void)simulate(foreign.path(), watcher), InputError);
+  EXPECT_EQ(read_file(foreign.path() / "summary.md"), "my own report");
 }
 
 TEST(Run, CheckpointWithoutItsRecordIsRefused) {

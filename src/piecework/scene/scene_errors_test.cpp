@@ -324,6 +324,8 @@ TEST(SceneErrors, ChoicesAndReferences) {
            {with(R"("quality": { "min_iterations": 9, "max_iterations": @8 })"),
             "/quality/max_iterations: max_iterations (8) is below min_iterations (9); exchange or "
             "correct them"},
+           {with(R"("step": { "steps": 60, "output_every": @7 })"),
+            "/step/output_every: 60 steps are no multiple of 7; choose a divisor of \"steps\""},
            {with(R"("camera": { "position": [1, 2, 3], "target": @[1, 2, 3] })"),
             "/camera/target: the camera looks at its own position; move \"target\" or "
             "\"position\""},

@@ -24,7 +24,7 @@ constexpr const char* kMinimal = R"({
 // Every key, each with a value that is not its default.
 constexpr const char* kEveryKey = R"({
   "name": "all", "description": "every key\nof a scene",
-  "step": { "h": 0.01, "steps": 7, "output_every": 2 },
+  "step": { "h": 0.01, "steps": 8, "output_every": 2 },
   "gravity": [1, 2, 3],
   "wind": { "velocity": [4, 5, 6], "air_density": 1.1, "normal_drag": 2, "tangential_drag": 0.5,
             "gust_amplitude": 0.25, "gust_period": 3 },
@@ -91,7 +91,7 @@ Cloth expected_second_cloth() {
 Scene expected_every_key() {
   Scene scene;
   scene.name = "all", scene.description = "every key\nof a scene", scene.source = "x/s.json";
-  scene.step = {0.01, 7, 2};
+  scene.step = {0.01, 8, 2};
   scene.gravity = {1, 2, 3};
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;

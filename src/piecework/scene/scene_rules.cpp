@@ -126,6 +126,12 @@ void check_rules(const Scene& scene, const Document& document) {
   check_overridden_materials(scene, document, root.in("materials"));
   check_order(root.in("quality").in("max_iterations"), scene.quality.min_iterations,
               scene.quality.max_iterations, "min_iterations", "max_iterations");
+  root.in("step")
+      .in("output_every")
+      .require(
+          scene.step.steps % scene.step.output_every == 0,
+          fmt::format("{} steps are no multiple of {}", scene.step.steps, scene.step.output_every),
+          "choose a divisor of \"steps\"");
   root.in("camera").in("target").require(
       !scene.camera.position || scene.camera.position != scene.camera.target,
       "the camera looks at its own position", "move \"target\" or \"position\"");
