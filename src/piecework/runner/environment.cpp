@@ -2,8 +2,10 @@
 
 #include <hwloc.h>
 #include <sys/utsname.h>
+#include <unistd.h>
 
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <memory>
 
@@ -104,6 +106,23 @@ std::string to_json(const Environment& environment) {
   nlohmann::ordered_json json;
   for (const auto& [key, value] : environment) json[key] = value;
   return json.dump();
+}
+
+CpuTime cpu_time() {
+  // cpu user nice system idle iowait irq softirq steal ..., in clock ticks
+  std::ifstream file("/proc/stat");
+  std::string label;
+  file >> label;
+  double busy = 0;
+  for (int column = 0; column < 8; ++column) {
+    double ticks = 0;
+    file >> ticks;
+    if (column != 3 && column != 4) busy += ticks;
+  }
+  std::timespec own{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &own);
+  return {busy / static_cast<double>(::sysconf(_SC_CLK_TCK)),
+          static_cast<double>(own.tv_sec) + 1e-9 * static_cast<double>(own.tv_nsec)};
 }
 
 double load_average() {

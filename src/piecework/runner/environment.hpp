@@ -20,4 +20,12 @@ std::string to_json(const Environment& environment);
 /// 1-minute load average.
 double load_average();
 
+/// Processor time since the machine started, s: of everything (time that a hypervisor took away
+/// included) and of this process.
+struct CpuTime {
+  double machine = 0;
+  double process = 0;
+};
+CpuTime cpu_time();
+
 }  // namespace piecework::runner

@@ -102,6 +102,13 @@ std::string table_one(const RunRecord& record, const World& world) {
   return text;
 }
 
+/// Other work took processors that this run wanted.
+bool is_disturbed(const RunRecord& record) {
+  constexpr double kNoticeable = 0.1;  // processors
+  const double spare = std::max(0, available_threads() - record.threads);
+  return record.other_processors > spare + kNoticeable;
+}
+
 /// Phases may leave 5 % of the run unexplained, and may not exceed it.
 bool phases_explain(const RunRecord& record) {
   double other = 0;
@@ -200,7 +207,7 @@ std::string to_markdown(const RunRecord& record, const World& world) {
   std::string text = fmt::format("# {}\n\n", world.scene.name);
   if (!world.scene.description.empty()) text += world.scene.description + "\n\n";
   if (record.frames.empty()) return text + "No step was simulated.\n";
-  const bool disturbed = record.load_before > 0.5 * available_threads();
+  const bool disturbed = is_disturbed(record);
   text += fmt::format("{}, {} threads, h = {:.6g} s. Times in ms per step{}.\n\n", record.method,
                       record.threads, world.scene.step.h, disturbed ? " †" : "");
   if (!record.overrides.empty()) text += overrides_line(record) + "\n";
@@ -214,7 +221,9 @@ std::string to_markdown(const RunRecord& record, const World& world) {
   if (record.setup.factor_nonzeros > 0)
     text += fmt::format("Factor: {} nonzeros, {} MB.\n", three_digits(record.setup.factor_nonzeros),
                         three_digits(record.setup.factor_bytes / 1e6));
-  if (disturbed) text += "\n† Disturbed: other work loaded the machine when the run began.\n";
+  if (disturbed)
+    text += fmt::format("\n† Disturbed: other work kept {} processors busy during the run.\n",
+                        three_digits(record.other_processors));
   for (const std::string& note : world.notes) text += fmt::format("\nNote: {}.\n", note);
   text += expectation_table(record);
   text += "\n## Environment\n\n" + environment_list(record);

@@ -146,6 +146,7 @@ std::string to_json(const RunRecord& record, const World& world) {
   json["environment"] = Json::parse(record.environment_json);
   json["environment"]["load_before"] = record.load_before;
   json["environment"]["load_after"] = record.load_after;
+  json["environment"]["other_processors"] = record.other_processors;
   json["environment"]["threads"] = record.threads;
   json["scene"] = scene_json(record, world);
   json["method"] = record.method;

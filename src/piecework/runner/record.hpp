@@ -57,6 +57,8 @@ struct RunRecord {
   std::vector<FrameRecord> frames;
   std::vector<ExpectationResult> expectations;
   double load_before = 0, load_after = 0;  ///< 1-minute load averages
+  /// Processors that other work kept busy during the run, on average; below 0: not known.
+  double other_processors = -1;
 };
 
 /// run.json, schema "piecework.run/1".

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <piecework/core/atomic_file.hpp>
+#include <piecework/core/clock.hpp>
 #include <piecework/core/descriptor.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
@@ -94,6 +95,7 @@ class Run {
     record_.overrides = options.overrides;
     record_.environment_json = to_json(describe_environment());
     record_.load_before = load_average();
+    cpu_before_ = cpu_time();
     frames_ = options.frames >= 0 ? options.frames : frame_count(scene);
   }
 
@@ -242,6 +244,12 @@ class Run {
 
   void write_reports() {
     record_.load_after = load_average();
+    const CpuTime now = cpu_time();
+    const double seconds = 1e-3 * since_start_.elapsed_ms();
+    constexpr double kMeasurable = 1.0;  // s; the machine counts in ticks of 10 ms
+    if (seconds >= kMeasurable)
+      record_.other_processors =
+          ((now.machine - cpu_before_.machine) - (now.process - cpu_before_.process)) / seconds;
     record_.expectations = expectations_.results();
     write_file_atomically(options_.directory / kRecord, to_json(record_, *world_));
     write_file_atomically(options_.directory / "timings.csv", to_csv(record_));
@@ -261,6 +269,8 @@ class Run {
   const RunOptions& options_;
   RunObserver& observer_;
   std::optional<Descriptor> lock_;
+  Stopwatch since_start_;
+  CpuTime cpu_before_;
   std::unique_ptr<World> world_;
   ExpectationChecker expectations_;
   std::unique_ptr<model::Integrator> integrator_;
