@@ -118,7 +118,8 @@ class Run {
       if (options_.checkpoint_every > 0 && frame_ % options_.checkpoint_every == 0) save();
       outcome.stopped = frame_ < frames_ && observer_.should_stop();
     }
-    if (!outcome.stopped) expectations_.finish(state_, record_.frames);
+    // "At the end" is the scene's end: a shortened run does not reach it.
+    if (state_.step >= world_->scene.step.steps) expectations_.finish(state_, record_.frames);
     record_.expectations = expectations_.results();
     // A run that was complete before keeps its reports, unless it was killed before their end.
     if (frame_ == 0 || simulated_ || !reports_complete_) save();
