@@ -73,6 +73,18 @@ TEST(World, RegionsByBoxSphereAndSet) {
       << "a union, each once";
 }
 
+TEST(World, TableclothHangsByItsCornersAtEveryResolution) {
+  for (const int side : {100, 20}) {
+    const std::string value = std::to_string(side);
+    const auto world = build_world(
+        scene::load_scene(std::string(PIECEWORK_SOURCE_DIR) + "/scenes/hanging_tablecloth.json",
+                          {{"cloths.0.mesh.columns", value}, {"cloths.0.mesh.rows", value}}));
+    ASSERT_EQ(world->pins.size(), 2U);
+    EXPECT_EQ(world->pins[0].vertices, std::vector<int>{0});
+    EXPECT_EQ(world->pins[1].vertices, std::vector<int>{side - 1});
+  }
+}
+
 TEST(World, RefusalsSayWhereAndWhatToDo) {
   const std::string mesh = R"("mesh": {"generator": "sheet", "columns": 3, "rows": 3})";
   const auto region = [&](const std::string& text) {
