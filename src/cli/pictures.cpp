@@ -186,7 +186,7 @@ std::vector<Shot> shots_of_run(const runner::World& world, const std::filesystem
   const std::string hash = runner::motion_hash(world);
   std::vector<Shot> shots;
   for (int frame = first; frame <= last; ++frame) {
-    const std::filesystem::path state = directory / "state" / (runner::frame_name(frame) + ".bin");
+    const std::filesystem::path state = runner::state_file(directory, frame);
     const auto positions = [&world, state, hash] {
       return runner::read_state(state, hash, world.model.num_vertices()).x;
     };

@@ -50,7 +50,7 @@ PictureOptions options_for(const scene::Scene& scene, const RenderArguments& arg
 
 int last_frame(const fs::path& directory) {
   int frame = -1;
-  while (fs::exists(directory / "state" / (runner::frame_name(frame + 1) + ".bin"))) ++frame;
+  while (fs::exists(runner::state_file(directory, frame + 1))) ++frame;
   if (frame < 0)
     throw InputError(fmt::format(
         "{}: no state/frame_0000.bin in it; name a directory that `piecework run` wrote "

@@ -81,7 +81,7 @@ struct RunArguments {
 };
 
 bool has_states(const std::filesystem::path& directory) {
-  return std::filesystem::exists(directory / "state" / (runner::frame_name(0) + ".bin"));
+  return std::filesystem::exists(runner::state_file(directory, 0));
 }
 
 class ConsoleObserver : public runner::RunObserver {
@@ -149,7 +149,7 @@ PictureOptions pictures_for(const scene::Scene& scene, const RunArguments& argum
 void remove_states(const std::filesystem::path& directory, int last_frame) {
   std::error_code ignored;
   for (int frame = 0; frame <= last_frame; ++frame)
-    std::filesystem::remove(directory / "state" / (runner::frame_name(frame) + ".bin"), ignored);
+    std::filesystem::remove(runner::state_file(directory, frame), ignored);
   std::filesystem::remove(directory / "state", ignored);
 }
 
@@ -167,16 +167,12 @@ void draw(const runner::RunOutcome& outcome, const RunArguments& arguments,
 
 /// Says how many steps ended before their stop rule held.
 void report_convergence(const runner::RunOutcome& outcome) {
-  int steps = 0;
-  int converged = 0;
-  for (const runner::FrameRecord& frame : outcome.record.frames) {
-    steps += frame.steps;
-    converged += frame.converged_steps;
-  }
+  const runner::Totals sum = runner::totals(outcome.record.frames);
   const scene::Quality& quality = outcome.world->scene.quality;
-  if (converged < steps && quality.stop != "iterations")
+  if (sum.converged_steps < sum.steps && quality.stop != "iterations")
     say("note: {} of {} steps stopped at {} iterations before `{}` reached {:g}\n",
-        steps - converged, steps, quality.max_iterations, quality.stop, quality.tolerance);
+        sum.steps - sum.converged_steps, sum.steps, quality.max_iterations, quality.stop,
+        quality.tolerance);
 }
 
 int report(const runner::RunOutcome& outcome, const RunArguments& arguments) {

@@ -51,18 +51,14 @@ Vec3 reaction(const World& world, const model::State& state, Rows rows) {
 }
 
 double of_frames(const std::string& quantity, const std::vector<FrameRecord>& frames) {
-  double gradient = 0;
-  double iterations = 0;
-  double converged = 0;
-  double steps = 0;
-  for (const FrameRecord& frame : frames) {
-    gradient = std::max(gradient, frame.gradient);
-    iterations += frame.iterations;
-    converged += frame.converged_steps;
-    steps += frame.steps;
+  if (quantity == "gradient") {
+    double largest = 0;
+    for (const FrameRecord& frame : frames) largest = std::max(largest, frame.gradient);
+    return largest;
   }
-  if (quantity == "gradient") return gradient;
-  return (quantity == "iterations" ? iterations : converged) / std::max(1.0, steps);
+  const Totals sum = totals(frames);
+  const int counted = quantity == "iterations" ? sum.iterations : sum.converged_steps;
+  return static_cast<double>(counted) / std::max(1, sum.steps);
 }
 
 std::string describe(const scene::Expectation& e) {

@@ -161,18 +161,14 @@ std::string accuracy_table(const RunRecord& record) {
 }
 
 std::string convergence_line(const RunRecord& record, const World& world) {
-  int converged = 0;
-  int total = 0;
-  for (const FrameRecord& frame : record.frames) {
-    converged += frame.converged_steps;
-    total += frame.steps;
-  }
+  const Totals sum = totals(record.frames);
   const scene::Quality& quality = world.scene.quality;
   std::string rule = quality.stop == "iterations"
                          ? fmt::format("{} iterations", quality.max_iterations)
                          : fmt::format("`{}` <= {:g}, at most {} iterations", quality.stop,
                                        quality.tolerance, quality.max_iterations);
-  return fmt::format("Stop rule: {}; {} of {} steps reached it.\n", rule, converged, total);
+  return fmt::format("Stop rule: {}; {} of {} steps reached it.\n", rule, sum.converged_steps,
+                     sum.steps);
 }
 
 std::string environment_list(const RunRecord& record) {

@@ -140,6 +140,16 @@ double FrameRecord::other_ms() const {
   return step_ms - sum;
 }
 
+Totals totals(const std::vector<FrameRecord>& frames) {
+  Totals sum;
+  for (const FrameRecord& frame : frames) {
+    sum.steps += frame.steps;
+    sum.converged_steps += frame.converged_steps;
+    sum.iterations += frame.iterations;
+  }
+  return sum;
+}
+
 std::string to_json(const RunRecord& record, const World& world) {
   Json json;
   json["schema"] = "piecework.run/1";

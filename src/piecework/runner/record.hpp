@@ -39,6 +39,14 @@ struct FrameRecord {
   [[nodiscard]] double other_ms() const;
 };
 
+/// Sums over the steps of some frames.
+struct Totals {
+  int steps = 0;
+  int converged_steps = 0;
+  int iterations = 0;
+};
+Totals totals(const std::vector<FrameRecord>& frames);
+
 /// One line of the scene's `expect` with what was found.
 struct ExpectationResult {
   std::string text;      ///< "lowest_y at 0.5 s within [-2.5, -0.7]"

@@ -183,7 +183,9 @@ class Run {
       try {
         frame.add(integrator_->step(state_));
       } catch (const SimulationError&) {
-        save_failed();
+        // Complete frames keep their record; the checkpoint stays where it was, since the frame in
+        // progress is incomplete.
+        write_reports();
         throw;
       }
       expectations_.observe(state_, record_.frames);
@@ -197,8 +199,7 @@ class Run {
   /// Writes the frame's files and shows it to the observer.
   void emit(const FrameRecord* frame) {
     if (options_.save_states)
-      write_state(options_.directory / "state" / (frame_name(frame_) + ".bin"), state_,
-                  record_.motion_hash);
+      write_state(state_file(options_.directory, frame_), state_, record_.motion_hash);
     export_frame(frame_, state_.x);
     observer_.frame_done(*world_, state_, frame_, frame);
   }
@@ -228,7 +229,7 @@ class Run {
   /// A continued run may ask for formats that its first part did not: made from the saved states.
   void export_earlier_frames() {
     for (int frame = 0; frame <= frame_; ++frame) {
-      const fs::path saved = options_.directory / "state" / (frame_name(frame) + ".bin");
+      const fs::path saved = state_file(options_.directory, frame);
       for (const mesh::ExportFormat format : options_.exports) {
         if (fs::exists(export_path(frame, format))) continue;
         if (!fs::exists(saved))
@@ -263,10 +264,6 @@ class Run {
     write_state(options_.directory / kCheckpoint, state_, record_.motion_hash);
   }
 
-  /// After a failed step: frames that are complete keep their record; the checkpoint stays where
-  /// it was, since the frame in progress is incomplete.
-  void save_failed() { write_reports(); }
-
   const RunOptions& options_;
   RunObserver& observer_;
   std::optional<Descriptor> lock_;
@@ -293,6 +290,10 @@ bool RunOutcome::expectations_hold() const {
 int frame_count(const scene::Scene& scene) { return scene.step.steps / scene.step.output_every; }
 
 std::string frame_name(int frame) { return fmt::format("frame_{:04}", frame); }
+
+fs::path state_file(const fs::path& directory, int frame) {
+  return directory / "state" / (frame_name(frame) + ".bin");
+}
 
 RunOutcome run(const scene::Scene& scene, const RunOptions& options, RunObserver& observer) {
   ThreadPool pool(options.threads > 0 ? options.threads : scene.solver.threads);

@@ -54,6 +54,9 @@ int frame_count(const scene::Scene& scene);
 /// "frame_0007".
 std::string frame_name(int frame);
 
+/// Where a run directory keeps the state of a frame: DIR/state/frame_0007.bin.
+std::filesystem::path state_file(const std::filesystem::path& directory, int frame);
+
 /// Simulates. An interrupted run of the same scene in the directory is continued with the same
 /// bits; a complete one is left as it is.
 /// \throws InputError if the directory holds a run of another scene, or as build_world();
