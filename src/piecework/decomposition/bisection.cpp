@@ -1,13 +1,9 @@
 #include "bisection.hpp"
 
-#include <metis.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
-
-#include <fmt/format.h>
 
 #include <piecework/core/error.hpp>
 
@@ -22,8 +18,6 @@ constexpr double kPoorBalance = 1.05;
 
 constexpr double kUnsplit = std::numeric_limits<double>::infinity();
 
-static_assert(sizeof(idx_t) == sizeof(std::int32_t), "METIS must be built with 32-bit indices");
-
 }  // namespace
 
 Bisector::Bisector(const TriangleGraph& graph, int seed)
@@ -32,34 +26,17 @@ Bisector::Bisector(const TriangleGraph& graph, int seed)
 void Bisector::extract(std::span<const int> set) {
   for (std::size_t i = 0; i < set.size(); ++i)
     local_[static_cast<std::size_t>(set[i])] = static_cast<int>(i);
-  begin_.assign(1, 0);
-  neighbor_.clear();
+  set_.begin.assign(1, 0);
+  set_.neighbor.clear();
   weight_.clear();
   for (const int triangle : set) {
     for (const int other : graph_.neighbors[static_cast<std::size_t>(triangle)])
       if (other >= 0 && local_[static_cast<std::size_t>(other)] >= 0)
-        neighbor_.push_back(local_[static_cast<std::size_t>(other)]);
-    begin_.push_back(static_cast<std::int32_t>(neighbor_.size()));
+        set_.neighbor.push_back(local_[static_cast<std::size_t>(other)]);
+    set_.begin.push_back(static_cast<std::int32_t>(set_.neighbor.size()));
     weight_.push_back(graph_.weight[static_cast<std::size_t>(triangle)]);
   }
   for (const int triangle : set) local_[static_cast<std::size_t>(triangle)] = -1;
-}
-
-bool Bisector::split_with_metis(double share) {
-  idx_t options[METIS_NOPTIONS];
-  METIS_SetDefaultOptions(options);
-  options[METIS_OPTION_SEED] = seed_;
-  idx_t count = static_cast<idx_t>(weight_.size());
-  idx_t constraints = 1;
-  idx_t parts = 2;
-  idx_t cut = 0;
-  real_t shares[2] = {static_cast<real_t>(share), static_cast<real_t>(1.0 - share)};
-  side_.assign(weight_.size(), 0);
-  const int status = METIS_PartGraphRecursive(&count, &constraints, begin_.data(), neighbor_.data(),
-                                              weight_.data(), nullptr, nullptr, &parts, shares,
-                                              nullptr, options, &cut, side_.data());
-  const auto second = std::count(side_.begin(), side_.end(), 1);
-  return status == METIS_OK && second > 0 && second < static_cast<std::ptrdiff_t>(side_.size());
 }
 
 /// Fills queue_ with the whole set, nearest to `start` first, and returns the farthest triangle.
@@ -68,9 +45,9 @@ int Bisector::breadth_first(int start) {
   queue_.assign(1, start);
   visited_[static_cast<std::size_t>(start)] = 1;
   for (std::size_t head = 0; head < queue_.size(); ++head)
-    for (auto k = begin_[static_cast<std::size_t>(queue_[head])];
-         k < begin_[static_cast<std::size_t>(queue_[head]) + 1]; ++k) {
-      const int next = neighbor_[static_cast<std::size_t>(k)];
+    for (auto k = set_.begin[static_cast<std::size_t>(queue_[head])];
+         k < set_.begin[static_cast<std::size_t>(queue_[head]) + 1]; ++k) {
+      const int next = set_.neighbor[static_cast<std::size_t>(k)];
       if (visited_[static_cast<std::size_t>(next)]) continue;
       visited_[static_cast<std::size_t>(next)] = 1;
       queue_.push_back(next);
@@ -119,8 +96,8 @@ void Bisector::keep_largest_part(int side) {
       const auto current = static_cast<std::size_t>(queue_.back());
       queue_.pop_back();
       part_weight.back() += weight_[current];
-      for (auto k = begin_[current]; k < begin_[current + 1]; ++k) {
-        const auto next = static_cast<std::size_t>(neighbor_[static_cast<std::size_t>(k)]);
+      for (auto k = set_.begin[current]; k < set_.begin[current + 1]; ++k) {
+        const auto next = static_cast<std::size_t>(set_.neighbor[static_cast<std::size_t>(k)]);
         if (side_[next] != side || visited_[next] >= 0) continue;
         visited_[next] = part;
         queue_.push_back(static_cast<int>(next));
@@ -155,8 +132,8 @@ void Bisector::grow(int side, double missing) {
   queue_.clear();
   visited_.assign(weight_.size(), 0);
   const auto reach = [&](std::size_t from) {
-    for (auto k = begin_[from]; k < begin_[from + 1]; ++k) {
-      const auto next = static_cast<std::size_t>(neighbor_[static_cast<std::size_t>(k)]);
+    for (auto k = set_.begin[from]; k < set_.begin[from + 1]; ++k) {
+      const auto next = static_cast<std::size_t>(set_.neighbor[static_cast<std::size_t>(k)]);
       if (side_[next] == side || visited_[next]) continue;
       visited_[next] = 1;
       queue_.push_back(static_cast<int>(next));
@@ -202,7 +179,7 @@ void Bisector::rebalance(double share) {
 std::size_t Bisector::split(std::span<int> set, double share) {
   PIECEWORK_ASSERT(set.size() >= 2);
   extract(set);
-  if (set.size() >= kSmallSet && split_with_metis(share)) {
+  if (set.size() >= kSmallSet && graph::bisect(set_, weight_, share, seed_, side_)) {
     make_connected();
     rebalance(share);
   } else {
@@ -219,10 +196,6 @@ std::size_t Bisector::split(std::span<int> set, double share) {
   }
   std::copy(second.begin(), second.end(), set.begin() + static_cast<std::ptrdiff_t>(first_size));
   return first_size;
-}
-
-std::string metis_version() {
-  return fmt::format("METIS {}.{}.{}", METIS_VER_MAJOR, METIS_VER_MINOR, METIS_VER_SUBMINOR);
 }
 
 }  // namespace piecework::decomposition

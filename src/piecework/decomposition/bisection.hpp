@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <piecework/graph/graph.hpp>
+
 namespace piecework::decomposition {
 
 /// Triangles as a graph: edge neighbours (-1 where there is none) and integer weights.
@@ -29,7 +31,6 @@ class Bisector {
 
  private:
   void extract(std::span<const int> set);
-  bool split_with_metis(double share);
   int breadth_first(int start);
   void split_by_growing(int start, double share);
   void improve_by_growing(double share);
@@ -42,12 +43,9 @@ class Bisector {
   const TriangleGraph& graph_;
   int seed_;
   std::vector<int> local_;  ///< global triangle -> index in the current set, -1 outside
-  // The current set as a compressed graph.
-  std::vector<std::int32_t> begin_, neighbor_, weight_, side_;
+  graph::Graph set_;         ///< the current set
+  std::vector<std::int32_t> weight_, side_;
   std::vector<int> visited_, queue_;
 };
-
-/// "METIS 5.1.0".
-std::string metis_version();
 
 }  // namespace piecework::decomposition

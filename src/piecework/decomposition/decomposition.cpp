@@ -314,7 +314,7 @@ Summary summarize(const Decomposition& decomposition, const Elements& elements) 
   return summary;
 }
 
-std::string library_version() { return metis_version(); }
+std::string library_version() { return graph::metis_version(); }
 
 std::vector<std::array<int, 2>> adjacent_domains(const Decomposition& decomposition,
                                                  std::span<const mesh::Hinge> hinges) {
