@@ -43,7 +43,7 @@ class Bisector {
   const TriangleGraph& graph_;
   int seed_;
   std::vector<int> local_;  ///< global triangle -> index in the current set, -1 outside
-  graph::Graph set_;         ///< the current set
+  graph::Graph set_;        ///< the current set
   std::vector<std::int32_t> weight_, side_;
   std::vector<int> visited_, queue_;
 };

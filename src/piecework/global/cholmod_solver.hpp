@@ -3,33 +3,16 @@
 // The undivided direct solver: CHOLMOD supernodal Cholesky with METIS ordering, n x n with three
 // right-hand sides. The honest baseline that every decomposed solver is compared with.
 
-#include <cstddef>
 #include <memory>
 #include <string>
 
 #include <piecework/core/types.hpp>
+#include <piecework/global/status.hpp>
 
 namespace piecework::global {
 
-/// Outcome of factor() and solve().
-enum class SolveStatus {
-  Ok,
-  NotPositiveDefinite,  ///< no factor is kept
-  OutOfMemory,          ///< no factor is kept
-  NotFactored,          ///< solve() came without a successful factor(); output not written
-};
-
 /// |V| x 3, column-major: the three right-hand sides one after the other, as BLAS wants them.
 using RightHandSides = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor>;
-
-struct FactorReport {
-  double analyze_ms = 0;            ///< ordering and symbolic analysis; 0 if the pattern was known
-  double factor_ms = 0;             ///< numeric factorisation
-  double nonzeros = 0;              ///< nnz(L), structural
-  double flops = 0;                 ///< of one numeric factorisation
-  std::size_t bytes = 0;            ///< of the stored factor
-  double reciprocal_condition = 0;  ///< crude estimate: (smallest / largest pivot of L)^2
-};
 
 /// K x = b with K |V| x |V| symmetric positive definite (N/m), b and x |V| x 3 (N, m).
 /// One BLAS thread. Not thread-safe; one object per thread.

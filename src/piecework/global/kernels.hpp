@@ -1,0 +1,106 @@
+#pragma once
+
+// The dense work of a triangular solve, compiled once per instruction set and chosen at run time.
+// Private to the global module.
+//
+// A panel is a block of columns of the factor in block LDL^T form: D^-1 of the columns themselves
+// ("own") and -B below, with B = L_below L_own^-1. Both parts are stored in strips of columns; a
+// strip holds chunks of as many rows as a vector has numbers, and in a chunk the columns follow
+// each other (the last chunk has fewer rows; nothing is padded but strips, to 64 bytes). So a sweep
+// in either direction reads each part front to back, without gathering or transposing, and with all
+// sums of a strip in registers.
+//
+// Vectors hold their right-hand sides ("lanes") one after the other: number r of lane l is at
+// v[r + l * stride].
+
+#include <cstddef>
+
+#include <piecework/global/isa.hpp>
+
+namespace piecework::global {
+
+/// Consecutive rows of a vector.
+struct RowRun {
+  int start;
+  int length;
+};
+
+/// A vector with its lanes.
+template <class T>
+struct Lanes {
+  T* data;
+  std::ptrdiff_t stride;
+  [[nodiscard]] Lanes at(std::ptrdiff_t row) const { return {data + row, stride}; }
+};
+
+/// A panel, or some of its rows below.
+template <class T>
+struct PanelView {
+  const T* own;    ///< cols x cols
+  const T* below;  ///< rows x cols
+  int cols;
+  int rows;        ///< below
+  int first_row;   ///< forward() starts with this row below ...
+  int num_rows;    ///< ... and does so many; a multiple of the chunk except at the end
+  bool inverse;    ///< "own" is D^-1; false: backward() leaves it out
+};
+
+/// Sweeps over panels for one number of lanes.
+template <class T>
+struct SweepKernels {
+  /// below += P x for the rows below of the view; x: cols rows.
+  void (*forward)(const PanelView<T>& panel, const Lanes<T>& x, const Lanes<T>& below);
+  /// y = own^T x_own + P^T x_below for the strips first_strip ... end_strip - 1, all rows below.
+  /// y, of which the strips' rows are written, must not overlap x_own.
+  void (*backward)(const PanelView<T>& panel, int first_strip, int end_strip, const Lanes<T>& x_own,
+                   const Lanes<T>& x_below, const Lanes<T>& y);
+  /// out = the rows of all runs, one after the other.
+  void (*gather)(const Lanes<T>& vector, const RowRun* runs, int num_runs, const Lanes<T>& out);
+  /// vector += in, at the rows of all runs.
+  void (*scatter_add)(const Lanes<T>& vector, const RowRun* runs, int num_runs,
+                      const Lanes<T>& in);
+};
+
+/// How many right-hand sides go through a sweep together.
+inline constexpr int kMaxLanes = 3;
+
+/// How panels are stored for an instruction set.
+struct PanelLayout {
+  int strip_cols;
+  int chunk_rows;
+  int alignment;  ///< numbers in 64 bytes
+
+  [[nodiscard]] std::size_t aligned(std::size_t numbers) const {
+    const auto quantum = static_cast<std::size_t>(alignment);
+    return (numbers + quantum - 1) / quantum * quantum;
+  }
+  /// Numbers that a block of `rows` x `cols` takes.
+  [[nodiscard]] std::size_t block_size(int rows, int cols) const {
+    const auto r = static_cast<std::size_t>(rows);
+    const auto full = static_cast<std::size_t>(cols / strip_cols);
+    const auto rest = static_cast<std::size_t>(cols % strip_cols);
+    return full * aligned(r * static_cast<std::size_t>(strip_cols)) + aligned(r * rest);
+  }
+  [[nodiscard]] int num_strips(int own) const { return (own + strip_cols - 1) / strip_cols; }
+};
+
+/// What one instruction set offers for numbers of type T.
+template <class T>
+struct Kernels {
+  PanelLayout layout;
+  SweepKernels<T> one;    ///< one right-hand side
+  SweepKernels<T> three;  ///< up to three
+};
+
+/// \pre this processor runs `isa`.
+template <class T>
+const Kernels<T>& kernels(Isa isa);
+
+template <class T>
+const Kernels<T>& portable_kernels();
+template <class T>
+const Kernels<T>& avx2_kernels();
+template <class T>
+const Kernels<T>& avx512_kernels();
+
+}  // namespace piecework::global

@@ -1,0 +1,109 @@
+#pragma once
+
+// The exact global solve as a tree: nested dissection, whose top cuts may be the borders of cloth
+// domains, gives an elimination tree; subtrees and tiles of large separators are worked on in
+// parallel. This is the recursive primal form at which [Lu25, Sec. 7.6 and Fig. 24] hints, with a
+// factor in block LDL^T form that both sweeps stream through.
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <piecework/global/isa.hpp>
+#include <piecework/global/pattern.hpp>
+#include <piecework/global/status.hpp>
+
+namespace piecework::global {
+
+enum class Precision {
+  Double,
+  /// The factor is stored in 32 bits. A solve is then a contraction, not an exact inverse: use it on
+  /// residuals (K dx = r, x += dx), whose error it reduces by TreeReport::contraction.
+  Single,
+};
+
+struct TreeOptions {
+  Precision precision = Precision::Double;
+  /// With Precision::Single: compute the factor in 32 bits as well: twice as fast, for matrices
+  /// that are refactored in every step.
+  bool factor_in_single = false;
+  /// With Precision::Single: the factor is redone in 64 bits if the estimated contraction of a solve
+  /// is worse (TreeReport::fallback says so). Not positive: no estimate.
+  double contraction_limit = 1e-2;
+  /// Pivot blocks with a larger 1-norm condition number are solved by substitution, not inverted:
+  /// explicit inverses are not backward stable. Default by precision: 1e4 and 1e3.
+  std::optional<double> condition_limit;
+  std::optional<Isa> isa;  ///< default: the best one of this processor
+  int seed = 1;            ///< of METIS
+};
+
+struct TreeReport : FactorReport {
+  double stored_numbers = 0;   ///< of the factor: nnz(L), explicit inverses and padding
+  double read_bytes = 0;       ///< that one solve reads of the factor: both sweeps
+  int fronts = 0;
+  int subtrees = 0;            ///< parallel tasks below the top of the tree
+  int levels = 0;              ///< of the top: barriers per sweep
+  int panels = 0;
+  int substituted_panels = 0;  ///< ill-conditioned, see TreeOptions::condition_limit
+  double max_condition = 0;    ///< largest 1-norm condition number of an inverted pivot block
+  Precision precision = Precision::Double;  ///< in use
+  double contraction = 0;      ///< estimated energy-norm error of one 32-bit solve; 0 in 64 bits
+  std::string fallback;        ///< why 64 bits are in use although 32 were asked for
+};
+
+/// A X = B with A symmetric positive definite, |V| x |V|, any number of right-hand sides, three
+/// at a time. Uses the threads of the caller's arena; results do not depend on their
+/// number. One object is used by one caller at a time; no allocation in solve().
+class TreeSolver {
+ public:
+  explicit TreeSolver(const TreeOptions& options = {});
+  ~TreeSolver();
+  TreeSolver(TreeSolver&&) noexcept;
+  TreeSolver& operator=(TreeSolver&&) noexcept;
+
+  /// Orders and plans; the spans are not needed afterwards. Drops any factor.
+  /// \param domains   optional: domains whose borders become the top separators
+  /// \param boundary  optional: rows that are kept to the end and not eliminated; see condense()
+  /// \throws InputError if the pattern is malformed (sizes, row out of range).
+  void analyze(const SymmetricPattern& pattern, const DomainTree* domains = nullptr,
+               std::span<const int> boundary = {});
+
+  /// Factors values on the analysed pattern, in the order of its row_index. Afterwards the solver
+  /// has this factor, or none if the status is not Ok (NotPositiveDefinite: indefinite, singular or
+  /// not finite).
+  [[nodiscard]] SolveStatus factor(std::span<const double> values);
+
+  /// X = A^-1 B; number c of row i at b[i * row_stride + c * column_stride]. b and x may be the same.
+  /// NotFactored: x is not written. With a boundary use condense() and expand().
+  [[nodiscard]] SolveStatus solve(const double* b, double* x, int columns, std::ptrdiff_t row_stride,
+                                  std::ptrdiff_t column_stride);
+
+  /// Schur complement of the boundary, lower triangle of |boundary|^2, column-major.
+  [[nodiscard]] std::span<const double> schur() const;
+
+  /// First half of a solve with up to three right-hand sides: adds to `boundary` (|boundary| x
+  /// columns, column-major) what eliminating the other rows leaves there: -A_bi A_ii^-1 b_i.
+  [[nodiscard]] SolveStatus condense(const double* b, int columns, std::ptrdiff_t row_stride,
+                                     std::ptrdiff_t column_stride, double* boundary);
+
+  /// Second half, after condense(): given the boundary's x, all other rows of x.
+  [[nodiscard]] SolveStatus expand(const double* boundary, double* x, int columns,
+                                   std::ptrdiff_t row_stride, std::ptrdiff_t column_stride);
+
+  [[nodiscard]] int size() const;
+  [[nodiscard]] const TreeReport& report() const;
+
+  /// Reads the stored factor once and returns a checksum: the bandwidth limit of a sweep.
+  [[nodiscard]] double read_factor() const;
+
+  /// "tree, 32-bit factor, AVX-512, METIS 5.1.0".
+  [[nodiscard]] std::string description() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace piecework::global

@@ -1,0 +1,354 @@
+#include "tree_sweep.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include <piecework/core/error.hpp>
+#include <piecework/core/parallel.hpp>
+
+namespace piecework::global {
+namespace {
+
+/// Numbers of a block that one task of a large front works on.
+constexpr std::ptrdiff_t kTileNumbers = 16384;
+
+template <int kLanes, class T>
+void clear(const Lanes<T>& vector, int rows) {
+  for (int l = 0; l < kLanes; ++l)
+    std::memset(vector.data + l * vector.stride, 0, static_cast<std::size_t>(rows) * sizeof(T));
+}
+
+template <int kLanes, class T>
+void copy(const Lanes<T>& from, int rows, const Lanes<T>& to) {
+  for (int l = 0; l < kLanes; ++l)
+    std::memcpy(to.data + l * to.stride, from.data + l * from.stride,
+                static_cast<std::size_t>(rows) * sizeof(T));
+}
+
+/// L of an ill-conditioned pivot block, in the order in which panels are stored.
+template <class T>
+class StoredTriangle {
+ public:
+  StoredTriangle(const T* data, int size, const PanelLayout& layout)
+      : data_(data), size_(size), layout_(layout) {}
+
+  /// x = L^-1 x.
+  void solve(T* x) const {
+    for (int c = 0; c < size_; ++c) {
+      x[c] /= at(c, c);
+      for (int r = c + 1; r < size_; ++r) x[r] -= at(r, c) * x[c];
+    }
+  }
+
+  /// x = L^-T x.
+  void solve_transposed(T* x) const {
+    for (int c = size_; c-- > 0;) {
+      for (int r = c + 1; r < size_; ++r) x[c] -= at(r, c) * x[r];
+      x[c] /= at(c, c);
+    }
+  }
+
+ private:
+  [[nodiscard]] T at(int row, int column) const {
+    const int strip = column / layout_.strip_cols;
+    const int cols = std::min(layout_.strip_cols, size_ - strip * layout_.strip_cols);
+    const int first = row / layout_.chunk_rows * layout_.chunk_rows;
+    const int chunk = std::min(layout_.chunk_rows, size_ - first);
+    const T* block = data_ + static_cast<std::size_t>(strip) *
+                                 layout_.aligned(static_cast<std::size_t>(size_) *
+                                                 static_cast<std::size_t>(layout_.strip_cols));
+    return block[first * cols + (column - strip * layout_.strip_cols) * chunk + (row - first)];
+  }
+
+  const T* data_;
+  int size_;
+  const PanelLayout& layout_;
+};
+
+}  // namespace
+
+template <class T>
+TreeSweep<T>::TreeSweep(const Symbolic& symbolic, const TreePlan& plan, const Kernels<T>& kernels)
+    : symbolic_(symbolic), plan_(plan), kernels_(kernels), workspace_(plan.workspace) {}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::load(int first_column, int count, const VectorView<const double>& b,
+                        const Lanes<T>& to) const {
+  const int* order = symbolic_.order.data() + first_column;
+  for (int l = 0; l < kLanes; ++l) {
+    T* out = to.data + l * to.stride;
+    if (l >= b.columns) {
+      std::memset(out, 0, static_cast<std::size_t>(count) * sizeof(T));
+      continue;
+    }
+    const double* from = b.data + l * b.column_stride;
+    for (int i = 0; i < count; ++i) out[i] = static_cast<T>(from[order[i] * b.row_stride]);
+  }
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::store(int first_column, int count, const Lanes<T>& from,
+                         const VectorView<double>& x) const {
+  const int* order = symbolic_.order.data() + first_column;
+  for (int l = 0; l < std::min(kLanes, x.columns); ++l) {
+    const T* in = from.data + l * from.stride;
+    double* to = x.data + l * x.column_stride;
+    for (int i = 0; i < count; ++i) to[order[i] * x.row_stride] = static_cast<double>(in[i]);
+  }
+}
+
+/// below -= B own; of a substituted panel, `own` becomes L^-1 own first.
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::forward_panel(const TreeFactor<T>& factor, std::size_t p, const Lanes<T>& own,
+                                 const Lanes<T>& below, bool tiled) const {
+  const Panel& panel = plan_.panels[p];
+  const T* numbers = factor.numbers.data();
+  PanelView<T> view{numbers + panel.own, numbers + panel.below, panel.cols, panel.rows, 0,
+                    panel.rows,          true};
+  if (factor.substituted[p]) {
+    const StoredTriangle<T> triangle(view.own, panel.cols, kernels_.layout);
+    for (int l = 0; l < kLanes; ++l) triangle.solve(own.data + l * own.stride);
+  }
+  const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(panel.rows) * panel.cols;
+  if (!tiled || size < 2 * kTileNumbers) {
+    sweeps<kLanes>().forward(view, own, below);
+    return;
+  }
+  const int chunk = kernels_.layout.chunk_rows;
+  const int tile = static_cast<int>(kTileNumbers / (panel.cols * chunk) + 1) * chunk;
+  parallel_for(
+      static_cast<std::size_t>((panel.rows + tile - 1) / tile),
+      [&](std::size_t i) {
+        PanelView<T> part = view;
+        part.first_row = static_cast<int>(i) * tile;
+        part.num_rows = std::min(tile, panel.rows - part.first_row);
+        sweeps<kLanes>().forward(part, own, below);
+      },
+      1);
+}
+
+/// out = D^-1 own - B^T below, or L^-T (own - L_below^T below) of a substituted panel.
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::backward_panel(const TreeFactor<T>& factor, std::size_t p, const Lanes<T>& own,
+                                  const Lanes<T>& below, const Lanes<T>& out, bool tiled) const {
+  const Panel& panel = plan_.panels[p];
+  const T* numbers = factor.numbers.data();
+  const PanelView<T> view{numbers + panel.own, numbers + panel.below, panel.cols, panel.rows, 0,
+                          panel.rows,          !factor.substituted[p]};
+  const int strips = kernels_.layout.num_strips(panel.cols);
+  const std::ptrdiff_t strip_size = static_cast<std::ptrdiff_t>(panel.rows + panel.cols) *
+                                    kernels_.layout.strip_cols;
+  if (!tiled || strip_size * strips < 2 * kTileNumbers) {
+    sweeps<kLanes>().backward(view, 0, strips, own, below, out);
+  } else {
+    const int tile = static_cast<int>(kTileNumbers / strip_size) + 1;
+    parallel_for(
+        static_cast<std::size_t>((strips + tile - 1) / tile),
+        [&](std::size_t i) {
+          const int first = static_cast<int>(i) * tile;
+          sweeps<kLanes>().backward(view, first, std::min(strips, first + tile), own, below, out);
+        },
+        1);
+  }
+  if (view.inverse) return;
+  const StoredTriangle<T> triangle(view.own, panel.cols, kernels_.layout);
+  for (int l = 0; l < kLanes; ++l) {
+    T* x = out.data + l * out.stride;
+    for (int c = 0; c < panel.cols; ++c) x[c] += own.data[c + l * own.stride];
+    triangle.solve_transposed(x);
+  }
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::forward_subtree(const TreeFactor<T>& factor, const Subtree& subtree,
+                                   const VectorView<const double>& b) {
+  const SweepKernels<T>& sweep = sweeps<kLanes>();
+  const Lanes<T> local = vector_of(subtree);
+  const Lanes<T> scratch{workspace_.data() + subtree.scratch, subtree.scratch_stride};
+  load<kLanes>(subtree.first_column, subtree.num_columns, b, local);
+  clear<kLanes>(local.at(subtree.num_columns), front(subtree.last_front).num_rows);
+  for (int f = subtree.first_front; f <= subtree.last_front; ++f) {
+    const Front& shape = front(f);
+    const FrontPlan& place = plan(f);
+    const Lanes<T> own = local.at(shape.first - subtree.first_column);
+    const Lanes<T> below = scratch.at(shape.width);
+    clear<kLanes>(below, shape.num_rows);
+    if (place.num_panels == 1) {
+      forward_panel<kLanes>(factor, place.first_panel, own, below, false);
+    } else {
+      copy<kLanes>(own, shape.width, scratch);
+      for (int k = 0; k < place.num_panels; ++k) {
+        const std::size_t p = place.first_panel + static_cast<std::size_t>(k);
+        const Panel& panel = plan_.panels[p];
+        forward_panel<kLanes>(factor, p, scratch.at(panel.first),
+                              scratch.at(panel.first + panel.cols), false);
+      }
+      copy<kLanes>(scratch, shape.width, own);
+    }
+    const RowRun whole{subtree.num_columns, shape.num_rows};
+    const bool is_root = f == subtree.last_front;
+    sweep.scatter_add(local, is_root ? &whole : plan_.runs.data() + place.first_run,
+                      is_root ? 1 : place.num_runs, below);
+  }
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::backward_subtree(const TreeFactor<T>& factor, const Subtree& subtree,
+                                    const VectorView<double>& x) {
+  const SweepKernels<T>& sweep = sweeps<kLanes>();
+  const Lanes<T> local = vector_of(subtree);
+  const Lanes<T> scratch{workspace_.data() + subtree.scratch, subtree.scratch_stride};
+  const FrontPlan& root = plan(subtree.last_front);
+  if (const int parent = front(subtree.last_front).parent; parent >= 0)
+    sweep.gather(vector_of(parent), plan_.runs.data() + root.first_run, root.num_runs,
+                 local.at(subtree.num_columns));
+  for (int f = subtree.last_front; f >= subtree.first_front; --f) {
+    const Front& shape = front(f);
+    const FrontPlan& place = plan(f);
+    const Lanes<T> own = local.at(shape.first - subtree.first_column);
+    const RowRun whole{subtree.num_columns, shape.num_rows};
+    const bool is_root = f == subtree.last_front;
+    sweep.gather(local, is_root ? &whole : plan_.runs.data() + place.first_run,
+                 is_root ? 1 : place.num_runs, scratch.at(shape.width));
+    for (int k = place.num_panels; k-- > 0;) {
+      const std::size_t p = place.first_panel + static_cast<std::size_t>(k);
+      const Panel& panel = plan_.panels[p];
+      backward_panel<kLanes>(factor, p, own.at(panel.first), scratch.at(panel.first + panel.cols),
+                             scratch.at(panel.first), false);
+    }
+    copy<kLanes>(scratch, shape.width, own);
+  }
+  store<kLanes>(subtree.first_column, subtree.num_columns, local, x);
+}
+
+template <class T>
+Lanes<T> TreeSweep<T>::rows_of_child(int child) const {
+  if (plan(child).subtree < 0) return vector_of(child).at(front(child).width);
+  const Subtree& subtree = plan_.subtrees[static_cast<std::size_t>(plan(child).subtree)];
+  return vector_of(subtree).at(subtree.num_columns);
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::forward_top(const TreeFactor<T>& factor, int f,
+                               const VectorView<const double>& b) {
+  const Front& shape = front(f);
+  const FrontPlan& place = plan(f);
+  const Lanes<T> vector = vector_of(f);
+  if (f == plan_.boundary_front)
+    clear<kLanes>(vector, shape.width);
+  else
+    load<kLanes>(shape.first, shape.width, b, vector);
+  clear<kLanes>(vector.at(shape.width), shape.num_rows);
+  for (const int child : plan_.children[static_cast<std::size_t>(f)])
+    sweeps<kLanes>().scatter_add(vector, plan_.runs.data() + plan(child).first_run,
+                                 plan(child).num_runs, rows_of_child(child));
+  for (int k = 0; k < place.num_panels; ++k) {
+    const std::size_t p = place.first_panel + static_cast<std::size_t>(k);
+    const Panel& panel = plan_.panels[p];
+    forward_panel<kLanes>(factor, p, vector.at(panel.first), vector.at(panel.first + panel.cols),
+                          true);
+  }
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::backward_top(const TreeFactor<T>& factor, int f, const VectorView<double>& x) {
+  if (f == plan_.boundary_front) return;
+  const Front& shape = front(f);
+  const FrontPlan& place = plan(f);
+  const Lanes<T> vector = vector_of(f);
+  const Lanes<T> solution{workspace_.data() + place.solution, place.stride};
+  if (shape.parent >= 0)
+    sweeps<kLanes>().gather(vector_of(shape.parent), plan_.runs.data() + place.first_run,
+                            place.num_runs, vector.at(shape.width));
+  for (int k = place.num_panels; k-- > 0;) {
+    const std::size_t p = place.first_panel + static_cast<std::size_t>(k);
+    const Panel& panel = plan_.panels[p];
+    const Lanes<T> own = vector.at(panel.first);
+    backward_panel<kLanes>(factor, p, own, vector.at(panel.first + panel.cols), solution, true);
+    copy<kLanes>(solution, panel.cols, own);
+  }
+  store<kLanes>(shape.first, shape.width, vector, x);
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::forward(const TreeFactor<T>& factor, const VectorView<const double>& b) {
+  parallel_for(
+      plan_.tasks.size(),
+      [&](std::size_t t) {
+        for (const int s : plan_.tasks[t])
+          forward_subtree<kLanes>(factor, plan_.subtrees[static_cast<std::size_t>(s)], b);
+      },
+      1);
+  for (const auto& level : plan_.levels)
+    parallel_for(
+        level.size(), [&](std::size_t i) { forward_top<kLanes>(factor, level[i], b); }, 1);
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::backward(const TreeFactor<T>& factor, const VectorView<double>& x) {
+  for (std::size_t level = plan_.levels.size(); level-- > 0;)
+    parallel_for(
+        plan_.levels[level].size(),
+        [&](std::size_t i) { backward_top<kLanes>(factor, plan_.levels[level][i], x); }, 1);
+  // What the forward sweep touched last is in the caches still.
+  parallel_for(
+      plan_.tasks.size(),
+      [&](std::size_t i) {
+        const auto& task = plan_.tasks[plan_.tasks.size() - 1 - i];
+        for (std::size_t s = task.size(); s-- > 0;)
+          backward_subtree<kLanes>(factor, plan_.subtrees[static_cast<std::size_t>(task[s])], x);
+      },
+      1);
+}
+
+template <class T>
+void TreeSweep<T>::solve(const TreeFactor<T>& factor, const VectorView<const double>& b,
+                         const VectorView<double>& x) {
+  if (b.columns == 1) {
+    forward<1>(factor, b);
+    backward<1>(factor, x);
+  } else {
+    forward<kMaxLanes>(factor, b);
+    backward<kMaxLanes>(factor, x);
+  }
+}
+
+template <class T>
+void TreeSweep<T>::condense(const TreeFactor<T>& factor, const VectorView<const double>& b,
+                            double* boundary) {
+  PIECEWORK_ASSERT(plan_.boundary_front >= 0);
+  forward<kMaxLanes>(factor, b);
+  const Lanes<T> vector = vector_of(plan_.boundary_front);
+  const int rows = symbolic_.num_boundary;
+  for (int c = 0; c < b.columns; ++c)
+    for (int r = 0; r < rows; ++r)
+      boundary[c * rows + r] += static_cast<double>(vector.data[r + c * vector.stride]);
+}
+
+template <class T>
+void TreeSweep<T>::expand(const TreeFactor<T>& factor, const double* boundary,
+                          const VectorView<double>& x) {
+  PIECEWORK_ASSERT(plan_.boundary_front >= 0);
+  const Lanes<T> vector = vector_of(plan_.boundary_front);
+  const int rows = symbolic_.num_boundary;
+  for (int c = 0; c < kMaxLanes; ++c)
+    for (int r = 0; r < rows; ++r)
+      vector.data[r + c * vector.stride] =
+          c < x.columns ? static_cast<T>(boundary[c * rows + r]) : T(0);
+  backward<kMaxLanes>(factor, x);
+}
+
+template class TreeSweep<float>;
+template class TreeSweep<double>;
+
+}  // namespace piecework::global
