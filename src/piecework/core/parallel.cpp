@@ -39,7 +39,10 @@ struct ThreadPool::Limit {
 
 ThreadPool::ThreadPool(int threads)
     : threads_(threads > 0 ? threads : available_threads()),
-      limit_(std::make_unique<Limit>(threads_)),
+      // oneTBB takes the smallest of all limits that exist, for all pools: so only pools that need
+      // more threads than cores set one.
+      limit_(threads_ > tbb::this_task_arena::max_concurrency() ? std::make_unique<Limit>(threads_)
+                                                                : nullptr),
       arena_(std::make_unique<tbb::task_arena>(threads_)) {}
 
 ThreadPool::~ThreadPool() = default;

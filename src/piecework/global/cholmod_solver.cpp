@@ -2,6 +2,8 @@
 
 #include <cholmod.h>
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include <piecework/core/clock.hpp>
@@ -126,19 +128,26 @@ SolveStatus CholmodSolver::refactor(const SparseMatrix& K) {
 SolveStatus CholmodSolver::solve(RightHandSides& b) {
   if (!impl_->factored) return SolveStatus::NotFactored;
   PIECEWORK_ASSERT(b.rows() == impl_->rows);
-  if (b.rows() == 0) return SolveStatus::Ok;
+  return solve(b.data(), 3);
+}
+
+SolveStatus CholmodSolver::solve(double* b, int columns) {
+  if (!impl_->factored) return SolveStatus::NotFactored;
+  const auto rows = static_cast<std::size_t>(impl_->rows);
+  const auto count = static_cast<std::size_t>(columns);
+  if (rows * count == 0) return SolveStatus::Ok;
   cholmod_dense rhs{};
-  rhs.nrow = static_cast<std::size_t>(b.rows());
-  rhs.ncol = 3;
-  rhs.nzmax = 3 * rhs.nrow;
-  rhs.d = rhs.nrow;
-  rhs.x = b.data();
+  rhs.nrow = rows;
+  rhs.ncol = count;
+  rhs.nzmax = rows * count;
+  rhs.d = rows;
+  rhs.x = b;
   rhs.xtype = CHOLMOD_REAL;
   rhs.dtype = CHOLMOD_DOUBLE;
   if (!cholmod_solve2(CHOLMOD_A, impl_->factor, &rhs, nullptr, &impl_->x, nullptr, &impl_->y,
                       &impl_->e, &impl_->common))
     return to_status(impl_->common.status);
-  b = Eigen::Map<const RightHandSides>(static_cast<const double*>(impl_->x->x), b.rows(), 3);
+  std::copy_n(static_cast<const double*>(impl_->x->x), rows * count, b);
   return SolveStatus::Ok;
 }
 

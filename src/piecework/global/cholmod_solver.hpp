@@ -33,6 +33,9 @@ class CholmodSolver {
   /// Overwrites b with K^-1 b. \pre b has K's number of rows.
   [[nodiscard]] SolveStatus solve(RightHandSides& b);
 
+  /// The same for |V| x columns numbers in column-major order.
+  [[nodiscard]] SolveStatus solve(double* b, int columns);
+
   [[nodiscard]] const FactorReport& report() const;
 
   /// "CHOLMOD 3.0.14 supernodal, METIS, OpenBLAS 1 thread".
