@@ -15,7 +15,8 @@ namespace piecework::global::dense {
 namespace {
 
 void trsm(CBLAS_TRANSPOSE trans, int m, int n, const double* l, int ldl, double* b, int ldb) {
-  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, trans, CblasNonUnit, m, n, 1.0, l, ldl, b, ldb);
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, trans, CblasNonUnit, m, n, 1.0, l, ldl, b,
+              ldb);
 }
 
 void trsm(CBLAS_TRANSPOSE trans, int m, int n, const float* l, int ldl, float* b, int ldb) {
@@ -70,7 +71,8 @@ void subtract_product<double>(int m, int n, int k, const double* a, int lda, con
 template <>
 void subtract_product<float>(int m, int n, int k, const float* a, int lda, const float* b, int ldb,
                              float* c, int ldc) {
-  cblas_sgemm(CblasColMajor, CblasNoTrans, CblasTrans, m, n, k, -1.0F, a, lda, b, ldb, 1.0F, c, ldc);
+  cblas_sgemm(CblasColMajor, CblasNoTrans, CblasTrans, m, n, k, -1.0F, a, lda, b, ldb, 1.0F, c,
+              ldc);
 }
 
 template <>

@@ -8,7 +8,8 @@ namespace piecework::global::dense {
 /// Keeps OpenBLAS to one thread: parallelism is over fronts and tiles.
 void use_one_thread();
 
-/// A = L L^T in the lower triangle of A (n x n). False if a pivot is not positive (or not a number).
+/// A = L L^T in the lower triangle of A (n x n). False if a pivot is not positive (or not a
+/// number).
 template <class T>
 bool cholesky(int n, T* a, int lda);
 

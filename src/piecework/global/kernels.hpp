@@ -39,16 +39,18 @@ struct PanelView {
   const T* own;    ///< cols x cols
   const T* below;  ///< rows x cols
   int cols;
-  int rows;        ///< below
-  int first_row;   ///< forward() starts with this row below ...
-  int num_rows;    ///< ... and does so many; a multiple of the chunk except at the end
-  bool inverse;    ///< "own" is D^-1; false: backward() leaves it out
+  int rows;       ///< below
+  int first_row;  ///< forward() starts with this row below ...
+  int num_rows;   ///< ... and does so many; a multiple of the chunk except at the end
+  bool inverse;   ///< "own" is D^-1; false: backward() leaves it out
+  bool fresh;     ///< what forward() adds to is zero, whatever the memory says
 };
 
 /// Sweeps over panels for one number of lanes.
 template <class T>
 struct SweepKernels {
-  /// below += P x for the rows below of the view; x: cols rows.
+  /// below += P x for the rows below of the view; x: cols rows. Writes whole vectors: after the
+  /// last row, each lane has room for kSlack numbers that nobody uses.
   void (*forward)(const PanelView<T>& panel, const Lanes<T>& x, const Lanes<T>& below);
   /// y = own^T x_own + P^T x_below for the strips first_strip ... end_strip - 1, all rows below.
   /// y, of which the strips' rows are written, must not overlap x_own.
@@ -57,9 +59,11 @@ struct SweepKernels {
   /// out = the rows of all runs, one after the other.
   void (*gather)(const Lanes<T>& vector, const RowRun* runs, int num_runs, const Lanes<T>& out);
   /// vector += in, at the rows of all runs.
-  void (*scatter_add)(const Lanes<T>& vector, const RowRun* runs, int num_runs,
-                      const Lanes<T>& in);
+  void (*scatter_add)(const Lanes<T>& vector, const RowRun* runs, int num_runs, const Lanes<T>& in);
 };
+
+/// Numbers by which the lanes of a vector are longer than its rows.
+inline constexpr int kSlack = 16;
 
 /// How many right-hand sides go through a sweep together.
 inline constexpr int kMaxLanes = 3;

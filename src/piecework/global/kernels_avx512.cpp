@@ -35,7 +35,9 @@ struct Float16 {
 
   template <int K>
   __attribute__((always_inline)) static inline void sum(const V (&v)[K], float* out) {
-    const auto get = [&](int k) __attribute__((always_inline)) { return k < K ? v[k < K ? k : 0] : zero(); };
+    const auto get = [&](int k) __attribute__((always_inline)) {
+      return k < K ? v[k < K ? k : 0] : zero();
+    };
     const V q0 = sum_four(get(0), get(1), get(2), get(3));
     if constexpr (K <= 4) {
       const __m256 half = _mm256_add_ps(_mm512_castps512_ps256(q0), _mm512_extractf32x8_ps(q0, 1));
@@ -68,7 +70,9 @@ struct Double8 {
 
   template <int K>
   __attribute__((always_inline)) static inline void sum(const V (&v)[K], double* out) {
-    const auto get = [&](int k) __attribute__((always_inline)) { return k < K ? v[k < K ? k : 0] : zero(); };
+    const auto get = [&](int k) __attribute__((always_inline)) {
+      return k < K ? v[k < K ? k : 0] : zero();
+    };
     const auto pair = [](V a, V b) {
       return add(_mm512_unpacklo_pd(a, b), _mm512_unpackhi_pd(a, b));
     };

@@ -13,8 +13,8 @@ struct Constant {
   constexpr operator int() const { return kIndex; }  // NOLINT(google-explicit-constructor)
 };
 
-/// body(0), ..., body(kCount - 1) with constant arguments: arrays indexed by them stay in registers,
-/// which no compiler does reliably for a loop.
+/// body(0), ..., body(kCount - 1) with constant arguments: arrays indexed by them stay in
+/// registers, which no compiler does reliably for a loop.
 template <int kCount, int kIndex = 0, class Body>
 __attribute__((always_inline)) inline void unroll(const Body& body) {
   if constexpr (kIndex < kCount) {
@@ -37,65 +37,73 @@ struct Sweep {
     return (numbers + kQuantum - 1) / kQuantum * kQuantum;
   }
 
-  /// One strip of K columns.
-  template <int K>
+  /// One strip of K columns. From the last number of the block to the first: so the whole forward
+  /// sweep runs backwards through memory, which prefetchers follow as well as they follow the
+  /// backward sweep forwards. Whole vectors of `below` are written even at its end, where missing
+  /// rows of the block count as zero: a load after a store of fewer numbers would have to wait.
+  template <int K, bool kFresh>
   static void forward_strip(const T* block, int rows, const T* x, long x_stride, T* below,
                             long below_stride) {
     V xs[K][kLanes];
     unroll<K>([&](auto c) PIECEWORK_INLINE {
       unroll<kLanes>([&](auto l) PIECEWORK_INLINE { xs[c][l] = S::repeat(x[c + l * x_stride]); });
     });
-    int r = 0;
-    for (; r + kSize <= rows; r += kSize) {
+    int r = rows / kSize * kSize;
+    block += static_cast<long>(K) * r;
+    const auto begin = [&](auto l) PIECEWORK_INLINE {
+      if constexpr (kFresh) return S::zero();
+      return S::load(below + r + l * below_stride);
+    };
+    if (const int rest = rows - r; rest > 0) {
       V sum[kLanes];
-      unroll<kLanes>(
-          [&](auto l) PIECEWORK_INLINE { sum[l] = S::load(below + r + l * below_stride); });
-      unroll<K>([&](auto c) PIECEWORK_INLINE {
+      unroll<kLanes>([&](auto l) PIECEWORK_INLINE { sum[l] = begin(l); });
+      unroll<K>([&](auto i) PIECEWORK_INLINE {
+        constexpr int c = K - 1 - i;
+        const V a = S::load_some(block + c * rest, rest);
+        unroll<kLanes>([&](auto l) PIECEWORK_INLINE { sum[l] = S::fma(a, xs[c][l], sum[l]); });
+      });
+      unroll<kLanes>([&](auto l)
+                         PIECEWORK_INLINE { S::store(below + r + l * below_stride, sum[l]); });
+    }
+    while ((r -= kSize) >= 0) {
+      block -= K * kSize;
+      V sum[kLanes];
+      unroll<kLanes>([&](auto l) PIECEWORK_INLINE { sum[l] = begin(l); });
+      unroll<K>([&](auto i) PIECEWORK_INLINE {
+        constexpr int c = K - 1 - i;
         const V a = S::load(block + c * kSize);
         unroll<kLanes>([&](auto l) PIECEWORK_INLINE { sum[l] = S::fma(a, xs[c][l], sum[l]); });
       });
-      unroll<kLanes>(
-          [&](auto l) PIECEWORK_INLINE { S::store(below + r + l * below_stride, sum[l]); });
-      block += K * kSize;
+      unroll<kLanes>([&](auto l)
+                         PIECEWORK_INLINE { S::store(below + r + l * below_stride, sum[l]); });
     }
-    if (r == rows) return;
-    const int rest = rows - r;
-    V sum[kLanes];
-    unroll<kLanes>([&](auto l) PIECEWORK_INLINE {
-      sum[l] = S::load_some(below + r + l * below_stride, rest);
-    });
-    unroll<K>([&](auto c) PIECEWORK_INLINE {
-      const V a = S::load_some(block + c * rest, rest);
-      unroll<kLanes>([&](auto l) PIECEWORK_INLINE { sum[l] = S::fma(a, xs[c][l], sum[l]); });
-    });
-    unroll<kLanes>([&](auto l) PIECEWORK_INLINE {
-      S::store_some(below + r + l * below_stride, sum[l], rest);
-    });
   }
 
   template <int K>
-  static void forward_last(int cols, const T* block, int rows, const T* x, long x_stride, T* below,
-                           long below_stride) {
+  static void forward_last(int cols, const T* block, const PanelView<T>& panel, const T* x,
+                           long x_stride, T* below, long below_stride) {
     if constexpr (K > 0) {
-      if (cols == K)
-        forward_strip<K>(block, rows, x, x_stride, below, below_stride);
+      if (cols != K)
+        forward_last<K - 1>(cols, block, panel, x, x_stride, below, below_stride);
+      else if (panel.fresh)
+        forward_strip<K, true>(block, panel.num_rows, x, x_stride, below, below_stride);
       else
-        forward_last<K - 1>(cols, block, rows, x, x_stride, below, below_stride);
+        forward_strip<K, false>(block, panel.num_rows, x, x_stride, below, below_stride);
     }
   }
 
   static void forward(const PanelView<T>& panel, const Lanes<T>& x, const Lanes<T>& below) {
-    const T* strip = panel.below;
     T* out = below.data + panel.first_row;
-    for (int c = 0; c < panel.cols; c += kStrip) {
-      const int cols = panel.cols - c < kStrip ? panel.cols - c : kStrip;
-      const T* block = strip + static_cast<long>(cols) * panel.first_row;
-      if (cols == kStrip)
-        forward_strip<kStrip>(block, panel.num_rows, x.data + c, x.stride, out, below.stride);
-      else
-        forward_last<kStrip - 1>(cols, block, panel.num_rows, x.data + c, x.stride, out,
-                                 below.stride);
-      strip += aligned(static_cast<long>(cols) * panel.rows);
+    const long strip = aligned(static_cast<long>(kStrip) * panel.rows);
+    int c = (panel.cols - 1) / kStrip * kStrip;  // the last strip comes first
+    const int cols = panel.cols - c;
+    const T* block = panel.below + c / kStrip * strip;
+    forward_last<kStrip>(cols, block + static_cast<long>(cols) * panel.first_row, panel, x.data + c,
+                         x.stride, out, below.stride);
+    while ((c -= kStrip) >= 0) {
+      block -= strip;
+      forward_strip<kStrip, false>(block + static_cast<long>(kStrip) * panel.first_row,
+                                   panel.num_rows, x.data + c, x.stride, out, below.stride);
     }
   }
 
@@ -113,20 +121,20 @@ struct Sweep {
       unroll<kLanes>([&](auto l) PIECEWORK_INLINE { xr[l] = S::load(x + r + l * x_stride); });
       unroll<K>([&](auto c) PIECEWORK_INLINE {
         const V a = S::load(block + c * kSize);
-        unroll<kLanes>(
-            [&](auto l) PIECEWORK_INLINE { sums.v[l][c] = S::fma(a, xr[l], sums.v[l][c]); });
+        unroll<kLanes>([&](auto l)
+                           PIECEWORK_INLINE { sums.v[l][c] = S::fma(a, xr[l], sums.v[l][c]); });
       });
       block += K * kSize;
     }
     if (r == rows) return;
     const int rest = rows - r;
     V xr[kLanes];
-    unroll<kLanes>(
-        [&](auto l) PIECEWORK_INLINE { xr[l] = S::load_some(x + r + l * x_stride, rest); });
+    unroll<kLanes>([&](auto l)
+                       PIECEWORK_INLINE { xr[l] = S::load_some(x + r + l * x_stride, rest); });
     unroll<K>([&](auto c) PIECEWORK_INLINE {
       const V a = S::load_some(block + c * rest, rest);
-      unroll<kLanes>(
-          [&](auto l) PIECEWORK_INLINE { sums.v[l][c] = S::fma(a, xr[l], sums.v[l][c]); });
+      unroll<kLanes>([&](auto l)
+                         PIECEWORK_INLINE { sums.v[l][c] = S::fma(a, xr[l], sums.v[l][c]); });
     });
   }
 
@@ -139,8 +147,8 @@ struct Sweep {
     });
     if (panel.inverse) add_block<K>(own, panel.cols, x_own.data, x_own.stride, sums);
     add_block<K>(block, panel.rows, x_below.data, x_below.stride, sums);
-    unroll<kLanes>(
-        [&](auto l) PIECEWORK_INLINE { S::template sum<K>(sums.v[l], y + l * y_stride); });
+    unroll<kLanes>([&](auto l)
+                       PIECEWORK_INLINE { S::template sum<K>(sums.v[l], y + l * y_stride); });
   }
 
   template <int K>

@@ -40,8 +40,7 @@ struct Plain4 {
 
   template <int K>
   __attribute__((always_inline)) static inline void sum(const V (&v)[K], Float* out) {
-    for (int k = 0; k < K; ++k)
-      out[k] = (v[k].v[0] + v[k].v[1]) + (v[k].v[2] + v[k].v[3]);
+    for (int k = 0; k < K; ++k) out[k] = (v[k].v[0] + v[k].v[1]) + (v[k].v[2] + v[k].v[3]);
   }
 };
 

@@ -14,9 +14,9 @@ namespace piecework::global {
 
 /// One node of the elimination tree: `width` consecutive columns, all with the same rows below.
 struct Front {
-  int first = 0;   ///< first column, in order of elimination
-  int width = 0;   ///< columns
-  int parent = -1; ///< front of its first row below, -1 for a root
+  int first = 0;              ///< first column, in order of elimination
+  int width = 0;              ///< columns
+  int parent = -1;            ///< front of its first row below, -1 for a root
   std::size_t row_begin = 0;  ///< into Symbolic::rows
   int num_rows = 0;           ///< rows below the columns
 };
@@ -42,8 +42,8 @@ struct Symbolic {
 /// `per_front` for each front, `per_row` for each of its rows and 1 for each number it stores and a
 /// solve reads. Units: the time for one stored number.
 struct MergeCosts {
-  double per_front = 400;
-  double per_row = 16;
+  double per_front = 300;
+  double per_row = 12;
   int leaf_columns = 16;  ///< whole subtrees of no more columns become one front
 };
 

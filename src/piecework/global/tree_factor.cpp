@@ -288,7 +288,8 @@ void Factorizer<T, N>::store_panel(std::size_t p, const FrontMatrix<N>& matrix, 
 
 /// Factors the front's own columns, panel by panel; its update matrix is left below them.
 template <class T, class N>
-bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled, Scratch& scratch) {
+bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled,
+                                 Scratch& scratch) {
   const FrontPlan& plan = plan_.fronts[static_cast<std::size_t>(f)];
   for (int k = 0; k < plan.num_panels; ++k) {
     const std::size_t p = plan.first_panel + static_cast<std::size_t>(k);
@@ -299,8 +300,7 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
     const double norm = norm1(panel.cols, pivot, matrix.size());
     if (!dense::cholesky<N>(panel.cols, pivot, matrix.size())) return false;
     for (int c = 0; c < panel.cols; ++c) {
-      const auto diagonal =
-          static_cast<double>(*matrix.at(panel.first + c, panel.first + c));
+      const auto diagonal = static_cast<double>(*matrix.at(panel.first + c, panel.first + c));
       if (!(diagonal > 0) || !std::isfinite(diagonal)) return false;  // BLAS lets NaN through
       scratch.outcome.min_pivot = std::min(scratch.outcome.min_pivot, diagonal);
       scratch.outcome.max_pivot = std::max(scratch.outcome.max_pivot, diagonal);
@@ -331,7 +331,8 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
 template <class T, class N>
 void Factorizer<T, N>::factor_subtree(const Subtree& subtree, Scratch& scratch) {
   const auto square = [&](int f) {
-    return static_cast<std::size_t>(front(f).num_rows) * static_cast<std::size_t>(front(f).num_rows);
+    return static_cast<std::size_t>(front(f).num_rows) *
+           static_cast<std::size_t>(front(f).num_rows);
   };
   std::size_t used = 0;
   std::size_t peak = 0;
@@ -368,9 +369,9 @@ void Factorizer<T, N>::factor_subtree(const Subtree& subtree, Scratch& scratch) 
       top += square(f);
     }
     for (std::size_t c = 0; c < rows; ++c)
-      std::copy_n(matrix.at(current.width + static_cast<int>(c),
-                            current.width + static_cast<int>(c)),
-                  rows - c, out + c * rows + c);
+      std::copy_n(
+          matrix.at(current.width + static_cast<int>(c), current.width + static_cast<int>(c)),
+          rows - c, out + c * rows + c);
   }
 }
 
@@ -381,7 +382,8 @@ void Factorizer<T, N>::factor_top(int f, Scratch& scratch) {
   const FrontMatrix<N> matrix{scratch.front_of(size * size), current.width, current.num_rows};
   assemble(f, matrix);
   for (const int child : plan_.children[static_cast<std::size_t>(f)]) {
-    extend_add(child, updates_[static_cast<std::size_t>(child)].data(), f, matrix, scratch.relative);
+    extend_add(child, updates_[static_cast<std::size_t>(child)].data(), f, matrix,
+               scratch.relative);
     updates_[static_cast<std::size_t>(child)] = {};
   }
   if (f == plan_.boundary_front) {
@@ -396,9 +398,8 @@ void Factorizer<T, N>::factor_top(int f, Scratch& scratch) {
   auto& update = updates_[static_cast<std::size_t>(f)];
   update = AlignedArray<N>(rows * rows);
   for (std::size_t c = 0; c < rows; ++c)
-    std::copy_n(
-        matrix.at(current.width + static_cast<int>(c), current.width + static_cast<int>(c)),
-        rows - c, update.data() + c * rows + c);
+    std::copy_n(matrix.at(current.width + static_cast<int>(c), current.width + static_cast<int>(c)),
+                rows - c, update.data() + c * rows + c);
 }
 
 template <class T, class N>

@@ -2,35 +2,15 @@
 
 // Numeric multifrontal factorisation over a planned tree. Private to the global module.
 
-#include <memory>
 #include <span>
 #include <vector>
 
 #include <piecework/global/status.hpp>
 
+#include "aligned_array.hpp"
 #include "tree_plan.hpp"
 
 namespace piecework::global {
-
-/// Numbers that start at 64 bytes and are not initialised.
-template <class T>
-class AlignedArray {
- public:
-  AlignedArray() = default;
-  explicit AlignedArray(std::size_t size)
-      : data_(static_cast<T*>(::operator new(size * sizeof(T), std::align_val_t(64)))),
-        size_(size) {}
-
-  [[nodiscard]] T* data() const { return data_.get(); }
-  [[nodiscard]] std::size_t size() const { return size_; }
-
- private:
-  struct Free {
-    void operator()(T* data) const { ::operator delete(data, std::align_val_t(64)); }
-  };
-  std::unique_ptr<T, Free> data_;
-  std::size_t size_ = 0;
-};
 
 /// Where a value of the matrix goes in its front.
 struct FrontEntry {
@@ -69,8 +49,8 @@ struct NumericInput {
   const TreePlan* plan;
   const FrontEntries* entries;
   std::span<const double> values;
-  PanelLayout layout;       ///< of the kernels that will read the panels
-  double condition_limit;   ///< pivot blocks above are not inverted
+  PanelLayout layout;      ///< of the kernels that will read the panels
+  double condition_limit;  ///< pivot blocks above are not inverted
 };
 
 /// Factors. On failure the factor's contents are void. Parallel over subtrees, then over the fronts

@@ -12,7 +12,8 @@ class Planner {
 
   TreePlan build() {
     plan_.fronts.resize(symbolic_.fronts.size());
-    if (symbolic_.num_boundary > 0) plan_.boundary_front = static_cast<int>(plan_.fronts.size()) - 1;
+    if (symbolic_.num_boundary > 0)
+      plan_.boundary_front = static_cast<int>(plan_.fronts.size()) - 1;
     link_children();
     cut_subtrees();
     group_tasks();
@@ -169,7 +170,7 @@ void Planner::place_panels() {
 
 void Planner::place_vectors() {
   const auto take = [&](int rows, int& stride) {
-    stride = static_cast<int>(layout_.aligned(static_cast<std::size_t>(rows)));
+    stride = static_cast<int>(layout_.aligned(static_cast<std::size_t>(rows + kSlack)));
     const std::size_t start = plan_.workspace;
     plan_.workspace += kMaxLanes * static_cast<std::size_t>(stride);
     return start;
@@ -212,7 +213,8 @@ void Planner::find_runs() {
       plan(f).first_run = plan_.runs.size();
       for (const int row : symbolic_.front_rows(front(f))) {
         const int column = row - subtree.first_column;
-        add_run(plan(f), column < subtree.num_columns ? column : place[static_cast<std::size_t>(row)]);
+        add_run(plan(f),
+                column < subtree.num_columns ? column : place[static_cast<std::size_t>(row)]);
       }
     }
   }

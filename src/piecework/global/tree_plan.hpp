@@ -30,8 +30,8 @@ struct FrontPlan {
   /// (roots of subtrees, fronts above them).
   std::size_t first_run = 0;
   int num_runs = 0;
-  int subtree = -1;        ///< -1: above the subtrees
-  std::size_t vector = 0;  ///< above the subtrees: where its vector starts in the workspace
+  int subtree = -1;          ///< -1: above the subtrees
+  std::size_t vector = 0;    ///< above the subtrees: where its vector starts in the workspace
   std::size_t solution = 0;  ///< where the backward sweep collects the columns of a panel
   int stride = 0;            ///< from lane to lane of both
 };
@@ -43,16 +43,18 @@ struct Subtree {
   int last_front = 0;  ///< its root
   int first_column = 0;
   int num_columns = 0;
-  std::size_t vector = 0;  ///< where its vector starts in the workspace
-  int stride = 0;          ///< from lane to lane
-  std::size_t scratch = 0; ///< workspace for the vector of one front at a time
+  std::size_t vector = 0;   ///< where its vector starts in the workspace
+  int stride = 0;           ///< from lane to lane
+  std::size_t scratch = 0;  ///< workspace for the vector of one front at a time
   int scratch_stride = 0;
 };
 
 struct PlanOptions {
-  int panel_columns = 64;      ///< inside subtrees; a multiple of 8
-  int top_panel_columns = 128; ///< above them
-  double subtree_numbers = 3e5;  ///< factor numbers of a subtree at most
+  // Chosen by measurement: narrow panels store no more numbers (a triangle of B replaces a square
+  // of D^-1), and above the subtrees each panel is a step that all threads wait for.
+  int panel_columns = 32;        ///< inside subtrees
+  int top_panel_columns = 64;    ///< above them
+  double subtree_numbers = 4e5;  ///< factor numbers of a subtree at most
   double task_numbers = 1e5;     ///< small subtrees share tasks of about this size
 };
 
@@ -72,7 +74,6 @@ struct TreePlan {
   int boundary_front = -1;  ///< front that is not eliminated, -1 without
 };
 
-TreePlan plan_tree(const Symbolic& symbolic, const PlanOptions& options,
-                   const PanelLayout& layout);
+TreePlan plan_tree(const Symbolic& symbolic, const PlanOptions& options, const PanelLayout& layout);
 
 }  // namespace piecework::global

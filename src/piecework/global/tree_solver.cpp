@@ -22,9 +22,8 @@ namespace {
 void check_pattern(const SymmetricPattern& pattern) {
   const int n = pattern.size();
   if (n == 0) return;
-  if (pattern.column_begin[0] != 0 ||
-      pattern.column_begin[static_cast<std::size_t>(n)] >
-          static_cast<int>(pattern.row_index.size()))
+  if (pattern.column_begin[0] != 0 || pattern.column_begin[static_cast<std::size_t>(n)] >
+                                          static_cast<int>(pattern.row_index.size()))
     throw InputError("matrix pattern: column_begin does not fit row_index");
   for (int c = 0; c < n; ++c) {
     const int begin = pattern.column_begin[static_cast<std::size_t>(c)];
@@ -99,8 +98,7 @@ struct TreeSolver::Impl {
     const TreePlan& plan = engine<T>().plan;
     report.stored_numbers = static_cast<double>(plan.factor_numbers);
     report.bytes = plan.factor_numbers * sizeof(T);
-    report.read_bytes =
-        sizeof(T) * (report.stored_numbers + static_cast<double>(plan.own_begin));
+    report.read_bytes = sizeof(T) * (report.stored_numbers + static_cast<double>(plan.own_begin));
     report.fronts = static_cast<int>(plan.fronts.size());
     report.panels = static_cast<int>(plan.panels.size());
     report.subtrees = static_cast<int>(plan.subtrees.size());
@@ -110,8 +108,9 @@ struct TreeSolver::Impl {
 
   template <class T, class N>
   SolveStatus factor_with(std::span<const double> values) {
-    NumericInput input{&symbolic, &engine<T>().plan, &entries, values,
-                       engine<T>().kernel_table.layout, condition_limit()};
+    NumericInput input{
+        &symbolic,        &engine<T>().plan, &entries, values, engine<T>().kernel_table.layout,
+        condition_limit()};
     const FactorOutcome outcome = factor_tree<T, N>(input, engine<T>().factor);
     factored = outcome.status == SolveStatus::Ok;
     report.substituted_panels = outcome.substituted_panels;

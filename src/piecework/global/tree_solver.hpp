@@ -19,8 +19,8 @@ namespace piecework::global {
 
 enum class Precision {
   Double,
-  /// The factor is stored in 32 bits. A solve is then a contraction, not an exact inverse: use it on
-  /// residuals (K dx = r, x += dx), whose error it reduces by TreeReport::contraction.
+  /// The factor is stored in 32 bits. A solve is then a contraction, not an exact inverse: use it
+  /// on residuals (K dx = r, x += dx), whose error it reduces by TreeReport::contraction.
   Single,
 };
 
@@ -29,8 +29,8 @@ struct TreeOptions {
   /// With Precision::Single: compute the factor in 32 bits as well: twice as fast, for matrices
   /// that are refactored in every step.
   bool factor_in_single = false;
-  /// With Precision::Single: the factor is redone in 64 bits if the estimated contraction of a solve
-  /// is worse (TreeReport::fallback says so). Not positive: no estimate.
+  /// With Precision::Single: the factor is redone in 64 bits if the estimated contraction of a
+  /// solve is worse (TreeReport::fallback says so). Not positive: no estimate.
   double contraction_limit = 1e-2;
   /// Pivot blocks with a larger 1-norm condition number are solved by substitution, not inverted:
   /// explicit inverses are not backward stable. Default by precision: 1e4 and 1e3.
@@ -40,17 +40,17 @@ struct TreeOptions {
 };
 
 struct TreeReport : FactorReport {
-  double stored_numbers = 0;   ///< of the factor: nnz(L), explicit inverses and padding
-  double read_bytes = 0;       ///< that one solve reads of the factor: both sweeps
+  double stored_numbers = 0;  ///< of the factor: nnz(L), explicit inverses and padding
+  double read_bytes = 0;      ///< that one solve reads of the factor: both sweeps
   int fronts = 0;
-  int subtrees = 0;            ///< parallel tasks below the top of the tree
-  int levels = 0;              ///< of the top: barriers per sweep
+  int subtrees = 0;  ///< parallel tasks below the top of the tree
+  int levels = 0;    ///< of the top: barriers per sweep
   int panels = 0;
   int substituted_panels = 0;  ///< ill-conditioned, see TreeOptions::condition_limit
   double max_condition = 0;    ///< largest 1-norm condition number of an inverted pivot block
   Precision precision = Precision::Double;  ///< in use
-  double contraction = 0;      ///< estimated energy-norm error of one 32-bit solve; 0 in 64 bits
-  std::string fallback;        ///< why 64 bits are in use although 32 were asked for
+  double contraction = 0;  ///< estimated energy-norm error of one 32-bit solve; 0 in 64 bits
+  std::string fallback;    ///< why 64 bits are in use although 32 were asked for
 };
 
 /// A X = B with A symmetric positive definite, |V| x |V|, any number of right-hand sides, three
@@ -75,10 +75,10 @@ class TreeSolver {
   /// not finite).
   [[nodiscard]] SolveStatus factor(std::span<const double> values);
 
-  /// X = A^-1 B; number c of row i at b[i * row_stride + c * column_stride]. b and x may be the same.
-  /// NotFactored: x is not written. With a boundary use condense() and expand().
-  [[nodiscard]] SolveStatus solve(const double* b, double* x, int columns, std::ptrdiff_t row_stride,
-                                  std::ptrdiff_t column_stride);
+  /// X = A^-1 B; number c of row i at b[i * row_stride + c * column_stride]. b and x may be the
+  /// same. NotFactored: x is not written. With a boundary use condense() and expand().
+  [[nodiscard]] SolveStatus solve(const double* b, double* x, int columns,
+                                  std::ptrdiff_t row_stride, std::ptrdiff_t column_stride);
 
   /// Schur complement of the boundary, lower triangle of |boundary|^2, column-major.
   [[nodiscard]] std::span<const double> schur() const;

@@ -25,8 +25,8 @@ struct Cloth {
   model::ClothModel model;
   SparseMatrix K;
 
-  explicit Cloth(const mesh::TriangleMesh& mesh,
-                 const model::Material& material = {0.5, 2e4, 2e-2}, double h = kH)
+  explicit Cloth(const mesh::TriangleMesh& mesh, const model::Material& material = {0.5, 2e4, 2e-2},
+                 double h = kH)
       : model(testing::cloth_model(mesh, material)), K(model::assemble_system(model, h)) {}
   explicit Cloth(int side) : Cloth(testing::grid_mesh(side, side)) {}
 };
@@ -35,10 +35,10 @@ struct Cloth {
 struct Borders {
   std::vector<int> parent, row_node;
   Borders(const Cloth& cloth, int domains) {
-    const auto parts = decomposition::decompose(
-        {cloth.model.triangles, cloth.model.hinges, cloth.model.hinge_bends,
-         cloth.model.num_vertices()},
-        {.domains = domains});
+    const auto parts =
+        decomposition::decompose({cloth.model.triangles, cloth.model.hinges,
+                                  cloth.model.hinge_bends, cloth.model.num_vertices()},
+                                 {.domains = domains});
     for (const auto& node : parts.nodes) parent.push_back(node.parent);
     row_node = parts.vertex_node;
   }
@@ -66,9 +66,9 @@ double backward_error(const SparseMatrix& K, const Positions& x, const Positions
   double worst = 0;
   for (int c = 0; c < 3; ++c) {
     const Eigen::VectorXd residual = b.col(c) - K * x.col(c);
-    worst = std::max(worst, residual.cwiseAbs().maxCoeff() /
-                                (norm * x.col(c).cwiseAbs().maxCoeff() +
-                                 b.col(c).cwiseAbs().maxCoeff()));
+    worst =
+        std::max(worst, residual.cwiseAbs().maxCoeff() / (norm * x.col(c).cwiseAbs().maxCoeff() +
+                                                          b.col(c).cwiseAbs().maxCoeff()));
   }
   return worst;
 }
@@ -127,10 +127,9 @@ TEST_P(EveryIsa, SubstitutesWhereInversesAreNotStable) {
   const Cloth cloth(40);
   const Positions b = testing::random_positions(1600, 1, 4);
   for (const Precision precision : {Precision::Double, Precision::Single}) {
-    TreeSolver solver = factored(cloth.K, {.precision = precision,
-                                           .contraction_limit = 0,
-                                           .condition_limit = 0,
-                                           .isa = GetParam()});
+    TreeSolver solver = factored(
+        cloth.K,
+        {.precision = precision, .contraction_limit = 0, .condition_limit = 0, .isa = GetParam()});
     EXPECT_EQ(solver.report().substituted_panels, solver.report().panels);
     EXPECT_LT(backward_error(cloth.K, solve(solver, b), b),
               precision == Precision::Double ? 1e-15 : 1e-6);
@@ -157,8 +156,8 @@ TEST(TreeSolver, FollowsTheBordersOfDomains) {
 
 TEST(TreeSolver, ClosedMeshesAndSeveralComponents) {
   for (const auto& mesh :
-       {testing::sphere_mesh(3), testing::disjoint_union(testing::sphere_mesh(2),
-                                                         testing::grid_mesh(9, 31))}) {
+       {testing::sphere_mesh(3),
+        testing::disjoint_union(testing::sphere_mesh(2), testing::grid_mesh(9, 31))}) {
     const Cloth cloth(mesh);
     const Borders borders(cloth, 5);
     const DomainTree tree = borders.tree();
@@ -176,8 +175,7 @@ TEST(TreeSolver, ThreadsDoNotChangeTheBits) {
     for (const int threads : {1, 2, 3, 8}) {
       ThreadPool pool(threads);
       const Positions x = pool.run([&] {
-        TreeSolver solver =
-            factored(cloth.K, {.precision = precision, .factor_in_single = true});
+        TreeSolver solver = factored(cloth.K, {.precision = precision, .factor_in_single = true});
         EXPECT_GT(solver.report().levels, 1) << "the top of the tree must be part of the test";
         EXPECT_GT(solver.report().subtrees, 4);
         return solve(solver, b);
@@ -343,9 +341,9 @@ TEST(TreeSolver, BoundaryIsCondensedAndExpanded) {
   EXPECT_LT((x_boundary - Eigen::MatrixXd(x)(boundary, Eigen::all)).norm(), 1e-8);
   Positions found = Positions::Zero(n, 3);
   ASSERT_EQ(solver.expand(x_boundary.data(), found.data(), 3, 3, 1), SolveStatus::Ok);
-  EXPECT_LT((Eigen::MatrixXd(found)(inner, Eigen::all) - Eigen::MatrixXd(x)(inner, Eigen::all))
-                .norm(),
-            1e-8);
+  EXPECT_LT(
+      (Eigen::MatrixXd(found)(inner, Eigen::all) - Eigen::MatrixXd(x)(inner, Eigen::all)).norm(),
+      1e-8);
 }
 
 /// A full 3n x 3n matrix, as Newton-type methods have it: one right-hand side, blocks of three.

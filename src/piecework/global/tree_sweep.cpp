@@ -18,13 +18,6 @@ void clear(const Lanes<T>& vector, int rows) {
     std::memset(vector.data + l * vector.stride, 0, static_cast<std::size_t>(rows) * sizeof(T));
 }
 
-template <int kLanes, class T>
-void copy(const Lanes<T>& from, int rows, const Lanes<T>& to) {
-  for (int l = 0; l < kLanes; ++l)
-    std::memcpy(to.data + l * to.stride, from.data + l * from.stride,
-                static_cast<std::size_t>(rows) * sizeof(T));
-}
-
 /// L of an ill-conditioned pivot block, in the order in which panels are stored.
 template <class T>
 class StoredTriangle {
@@ -76,15 +69,19 @@ template <int kLanes>
 void TreeSweep<T>::load(int first_column, int count, const VectorView<const double>& b,
                         const Lanes<T>& to) const {
   const int* order = symbolic_.order.data() + first_column;
-  for (int l = 0; l < kLanes; ++l) {
-    T* out = to.data + l * to.stride;
-    if (l >= b.columns) {
-      std::memset(out, 0, static_cast<std::size_t>(count) * sizeof(T));
-      continue;
+  if (b.columns == kLanes) {
+    for (int i = 0; i < count; ++i) {
+      const double* from = b.data + order[i] * b.row_stride;
+      for (int l = 0; l < kLanes; ++l)
+        to.data[i + l * to.stride] = static_cast<T>(from[l * b.column_stride]);
     }
-    const double* from = b.data + l * b.column_stride;
-    for (int i = 0; i < count; ++i) out[i] = static_cast<T>(from[order[i] * b.row_stride]);
+    return;
   }
+  for (int l = 0; l < kLanes; ++l)
+    for (int i = 0; i < count; ++i)
+      to.data[i + l * to.stride] =
+          l < b.columns ? static_cast<T>(b.data[order[i] * b.row_stride + l * b.column_stride])
+                        : T(0);
 }
 
 template <class T>
@@ -92,22 +89,42 @@ template <int kLanes>
 void TreeSweep<T>::store(int first_column, int count, const Lanes<T>& from,
                          const VectorView<double>& x) const {
   const int* order = symbolic_.order.data() + first_column;
-  for (int l = 0; l < std::min(kLanes, x.columns); ++l) {
-    const T* in = from.data + l * from.stride;
-    double* to = x.data + l * x.column_stride;
-    for (int i = 0; i < count; ++i) to[order[i] * x.row_stride] = static_cast<double>(in[i]);
+  if (x.columns == kLanes) {
+    for (int i = 0; i < count; ++i) {
+      double* to = x.data + order[i] * x.row_stride;
+      for (int l = 0; l < kLanes; ++l)
+        to[l * x.column_stride] = static_cast<double>(from.data[i + l * from.stride]);
+    }
+    return;
   }
+  for (int l = 0; l < std::min(kLanes, x.columns); ++l)
+    for (int i = 0; i < count; ++i)
+      x.data[order[i] * x.row_stride + l * x.column_stride] =
+          static_cast<double>(from.data[i + l * from.stride]);
+}
+
+template <class T>
+template <int kLanes>
+void TreeSweep<T>::copy(const Lanes<T>& from, int rows, const Lanes<T>& to) const {
+  const RowRun all{0, rows};
+  sweeps<kLanes>().gather(from, &all, 1, to);
 }
 
 /// below -= B own; of a substituted panel, `own` becomes L^-1 own first.
 template <class T>
 template <int kLanes>
 void TreeSweep<T>::forward_panel(const TreeFactor<T>& factor, std::size_t p, const Lanes<T>& own,
-                                 const Lanes<T>& below, bool tiled) const {
+                                 const Lanes<T>& below, bool tiled, bool fresh) const {
   const Panel& panel = plan_.panels[p];
   const T* numbers = factor.numbers.data();
-  PanelView<T> view{numbers + panel.own, numbers + panel.below, panel.cols, panel.rows, 0,
-                    panel.rows,          true};
+  PanelView<T> view{numbers + panel.own,
+                    numbers + panel.below,
+                    panel.cols,
+                    panel.rows,
+                    0,
+                    panel.rows,
+                    true,
+                    fresh};
   if (factor.substituted[p]) {
     const StoredTriangle<T> triangle(view.own, panel.cols, kernels_.layout);
     for (int l = 0; l < kLanes; ++l) triangle.solve(own.data + l * own.stride);
@@ -137,11 +154,11 @@ void TreeSweep<T>::backward_panel(const TreeFactor<T>& factor, std::size_t p, co
                                   const Lanes<T>& below, const Lanes<T>& out, bool tiled) const {
   const Panel& panel = plan_.panels[p];
   const T* numbers = factor.numbers.data();
-  const PanelView<T> view{numbers + panel.own, numbers + panel.below, panel.cols, panel.rows, 0,
-                          panel.rows,          !factor.substituted[p]};
+  const PanelView<T> view{numbers + panel.own, numbers + panel.below,  panel.cols, panel.rows, 0,
+                          panel.rows,          !factor.substituted[p], false};
   const int strips = kernels_.layout.num_strips(panel.cols);
-  const std::ptrdiff_t strip_size = static_cast<std::ptrdiff_t>(panel.rows + panel.cols) *
-                                    kernels_.layout.strip_cols;
+  const std::ptrdiff_t strip_size =
+      static_cast<std::ptrdiff_t>(panel.rows + panel.cols) * kernels_.layout.strip_cols;
   if (!tiled || strip_size * strips < 2 * kTileNumbers) {
     sweeps<kLanes>().backward(view, 0, strips, own, below, out);
   } else {
@@ -177,16 +194,16 @@ void TreeSweep<T>::forward_subtree(const TreeFactor<T>& factor, const Subtree& s
     const FrontPlan& place = plan(f);
     const Lanes<T> own = local.at(shape.first - subtree.first_column);
     const Lanes<T> below = scratch.at(shape.width);
-    clear<kLanes>(below, shape.num_rows);
     if (place.num_panels == 1) {
-      forward_panel<kLanes>(factor, place.first_panel, own, below, false);
+      forward_panel<kLanes>(factor, place.first_panel, own, below, false, true);
     } else {
       copy<kLanes>(own, shape.width, scratch);
+      clear<kLanes>(below, shape.num_rows);
       for (int k = 0; k < place.num_panels; ++k) {
         const std::size_t p = place.first_panel + static_cast<std::size_t>(k);
         const Panel& panel = plan_.panels[p];
         forward_panel<kLanes>(factor, p, scratch.at(panel.first),
-                              scratch.at(panel.first + panel.cols), false);
+                              scratch.at(panel.first + panel.cols), false, false);
       }
       copy<kLanes>(scratch, shape.width, own);
     }
@@ -253,7 +270,7 @@ void TreeSweep<T>::forward_top(const TreeFactor<T>& factor, int f,
     const std::size_t p = place.first_panel + static_cast<std::size_t>(k);
     const Panel& panel = plan_.panels[p];
     forward_panel<kLanes>(factor, p, vector.at(panel.first), vector.at(panel.first + panel.cols),
-                          true);
+                          true, false);
   }
 }
 

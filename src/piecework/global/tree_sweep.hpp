@@ -17,7 +17,8 @@ struct VectorView {
 };
 
 /// Everything a solve needs; nothing is allocated during one. Parallel over subtrees, then over the
-/// fronts of a level and the strips or rows of large ones; the same bits for every number of threads.
+/// fronts of a level and the strips or rows of large ones; the same bits for every number of
+/// threads.
 template <class T>
 class TreeSweep {
  public:
@@ -45,6 +46,8 @@ class TreeSweep {
   template <int kLanes>
   void store(int first_column, int count, const Lanes<T>& from, const VectorView<double>& x) const;
   template <int kLanes>
+  void copy(const Lanes<T>& from, int rows, const Lanes<T>& to) const;
+  template <int kLanes>
   void forward_subtree(const TreeFactor<T>& factor, const Subtree& subtree,
                        const VectorView<const double>& b);
   template <int kLanes>
@@ -56,7 +59,7 @@ class TreeSweep {
   void backward_top(const TreeFactor<T>& factor, int f, const VectorView<double>& x);
   template <int kLanes>
   void forward_panel(const TreeFactor<T>& factor, std::size_t p, const Lanes<T>& own,
-                     const Lanes<T>& below, bool tiled) const;
+                     const Lanes<T>& below, bool tiled, bool fresh) const;
   template <int kLanes>
   void backward_panel(const TreeFactor<T>& factor, std::size_t p, const Lanes<T>& own,
                       const Lanes<T>& below, const Lanes<T>& out, bool tiled) const;
