@@ -11,9 +11,9 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
 #include <Eigen/MetisSupport>
 #include <Eigen/SparseCholesky>
-#include <fmt/format.h>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/decomposition/decomposition.hpp>
@@ -45,10 +45,9 @@ struct Problem {
 
   Problem(std::int64_t vertices, bool bending)
       : model(testing::cloth_model(
-            mesh::generate(mesh::GeneratorKind::Sheet,
-                           {.columns = side_of(vertices),
-                            .rows = side_of(vertices),
-                            .pattern = mesh::SheetPattern::Delaunay})
+            mesh::generate(mesh::GeneratorKind::Sheet, {.columns = side_of(vertices),
+                                                        .rows = side_of(vertices),
+                                                        .pattern = mesh::SheetPattern::Delaunay})
                 .mesh,
             {0.5, 2e4, bending ? std::optional(2e-2) : std::nullopt})),
         K(model::assemble_system(model, kH)),
@@ -97,9 +96,9 @@ struct Method {
   std::function<void()> set_up;         ///< everything before the first solve
   std::function<void(Positions&)> run;  ///< what is timed
   std::function<void(Counters&)> count = [](Counters&) {};
-  double error_limit = 1e-9;            ///< relative, 2-norm; not positive: nothing to compare
-  double contraction_limit = 0;         ///< energy norm, for solvers in 32 bits
-  std::function<void()> baseline;       ///< default: CHOLMOD's solve
+  double error_limit = 1e-9;       ///< relative, 2-norm; not positive: nothing to compare
+  double contraction_limit = 0;    ///< energy norm, for solvers in 32 bits
+  std::function<void()> baseline;  ///< default: CHOLMOD's solve
 };
 
 struct Row {
@@ -281,8 +280,8 @@ double busy_threads(const std::function<void()>& call) {
 }
 
 void measure(benchmark::State& state, Maker make, bool bending) {
-  const Row row{state.range(0), static_cast<int>(state.range(1)),
-                static_cast<int>(state.range(2)), bending};
+  const Row row{state.range(0), static_cast<int>(state.range(1)), static_cast<int>(state.range(2)),
+                bending};
   if (row.threads > available_threads()) {
     skip(state, fmt::format("{} threads on {} cores", row.threads, available_threads()));
     return;
@@ -308,8 +307,7 @@ void measure(benchmark::State& state, Maker make, bool bending) {
   state.counters["cpu_over_wall"] = busy_threads([&] { ours.run([&] { method.run(x); }); });
   method.count(state.counters);
   if (state.counters.count("read_bytes") > 0 && method.error_limit + method.contraction_limit > 0)
-    state.counters["GB_per_s"] =
-        state.counters["read_bytes"] / timer.a_seconds().median / 1e9;
+    state.counters["GB_per_s"] = state.counters["read_bytes"] / timer.a_seconds().median / 1e9;
   if (state.counters.count("flops") > 0)
     state.counters["GF_per_s"] = state.counters["flops"] / timer.a_seconds().median / 1e9;
 }
@@ -318,8 +316,9 @@ void add(const std::string& method, Maker make, const std::vector<std::int64_t>&
          const std::vector<std::int64_t>& domains, const std::vector<std::int64_t>& threads,
          bool bending = true) {
   const std::string group = bending ? "global" : "global_stretch_only";
-  auto* row = benchmark::RegisterBenchmark((group + "/" + method).c_str(),
-                                           [=](benchmark::State& state) { measure(state, make, bending); });
+  auto* row =
+      benchmark::RegisterBenchmark((group + "/" + method).c_str(),
+                                   [=](benchmark::State& state) { measure(state, make, bending); });
   row->Unit(benchmark::kMillisecond)->UseManualTime()->ArgNames({"n", "D", "threads"});
   row->Iterations(quick() ? 6 : 21);
   for (const std::int64_t n : sizes)
@@ -345,12 +344,18 @@ void register_size(std::int64_t n) {
   const std::vector<std::int64_t> threads{1, 2, 4, 8, 16};
   add("cholmod", [](Problem& p, const Row&) { return cholmod(p); }, {n}, {1}, {1});
   if (n <= 60025) {
-    add("eigen_llt", [](Problem& p, const Row&) {
-      return eigen<Eigen::SimplicialLLT<SparseMatrix, Eigen::Lower, Eigen::MetisOrdering<int>>>(p);
-    }, {n}, {1}, {1});
-    add("eigen_ldlt", [](Problem& p, const Row&) {
-      return eigen<Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::MetisOrdering<int>>>(p);
-    }, {n}, {1}, {1});
+    add("eigen_llt",
+        [](Problem& p, const Row&) {
+          return eigen<Eigen::SimplicialLLT<SparseMatrix, Eigen::Lower, Eigen::MetisOrdering<int>>>(
+              p);
+        },
+        {n}, {1}, {1});
+    add("eigen_ldlt",
+        [](Problem& p, const Row&) {
+          return eigen<
+              Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower, Eigen::MetisOrdering<int>>>(p);
+        },
+        {n}, {1}, {1});
     add("cholmod_3n", [](Problem& p, const Row&) { return naive(p); }, {n}, {1}, {1});
   }
   add("read_limit_f64", read_f64, {n}, {1}, threads);

@@ -68,6 +68,21 @@ inline constexpr int kSlack = 16;
 /// How many right-hand sides go through a sweep together.
 inline constexpr int kMaxLanes = 3;
 
+/// Small dense column-major matrices of a factorisation; columns start at multiples of 64 bytes.
+template <class T>
+struct DenseKernels {
+  /// Cholesky factorisation of columns first ... last - 1 of a matrix of which the lower triangle
+  /// is given and the columns before are done: L in those columns, and columns last ... end - 1
+  /// less what L takes from them. Entries above the diagonal are void afterwards. False if a pivot
+  /// is not positive or not finite. `work`: 8 * rows numbers.
+  bool (*eliminate)(T* a, int rows, int ld, int first, int last, int end, T* work);
+  /// X = X L^-1; X: rows (a multiple of the chunk) x width, L lower triangular.
+  void (*solve_right)(const T* l, int ldl, int width, T* x, int ldx, int rows);
+  /// Z = Y^T Y in full for lower triangular Y (width x width, zero above the diagonal; whole chunks
+  /// of rows are read and written). `work`: ldy * width numbers.
+  void (*square)(const T* y, int ldy, int width, T* z, int ldz, T* work);
+};
+
 /// How panels are stored for an instruction set.
 struct PanelLayout {
   int strip_cols;
@@ -94,6 +109,7 @@ struct Kernels {
   PanelLayout layout;
   SweepKernels<T> one;    ///< one right-hand side
   SweepKernels<T> three;  ///< up to three
+  DenseKernels<T> dense;
 };
 
 /// \pre this processor runs `isa`.

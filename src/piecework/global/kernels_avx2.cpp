@@ -27,6 +27,10 @@ struct Float8 {
   static V fma(V a, V b, V c) { return _mm256_fmadd_ps(a, b, c); }
   static V add(V a, V b) { return _mm256_add_ps(a, b); }
   static V zero() { return _mm256_setzero_ps(); }
+  static V mul(V a, V b) { return _mm256_mul_ps(a, b); }
+  static V negative(V a) { return _mm256_sub_ps(zero(), a); }
+  static float root(float number) { return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(number))); }
+  static constexpr float kHuge = __FLT_MAX__;
 
   template <int K>
   __attribute__((always_inline)) static inline void sum(const V (&v)[K], float* out) {
@@ -55,6 +59,12 @@ struct Double4 {
   static V fma(V a, V b, V c) { return _mm256_fmadd_pd(a, b, c); }
   static V add(V a, V b) { return _mm256_add_pd(a, b); }
   static V zero() { return _mm256_setzero_pd(); }
+  static V mul(V a, V b) { return _mm256_mul_pd(a, b); }
+  static V negative(V a) { return _mm256_sub_pd(zero(), a); }
+  static double root(double number) {
+    return _mm_cvtsd_f64(_mm_sqrt_sd(_mm_setzero_pd(), _mm_set_sd(number)));
+  }
+  static constexpr double kHuge = __DBL_MAX__;
 
   template <int K>
   __attribute__((always_inline)) static inline void sum(const V (&v)[K], double* out) {

@@ -22,6 +22,10 @@ struct Float16 {
   static V fma(V a, V b, V c) { return _mm512_fmadd_ps(a, b, c); }
   static V add(V a, V b) { return _mm512_add_ps(a, b); }
   static V zero() { return _mm512_setzero_ps(); }
+  static V mul(V a, V b) { return _mm512_mul_ps(a, b); }
+  static V negative(V a) { return _mm512_sub_ps(zero(), a); }
+  static float root(float number) { return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(number))); }
+  static constexpr float kHuge = __FLT_MAX__;
 
   /// Sums of four vectors, each as four partial sums in one group of lanes.
   static V sum_four(V a, V b, V c, V d) {
@@ -67,6 +71,12 @@ struct Double8 {
   static V fma(V a, V b, V c) { return _mm512_fmadd_pd(a, b, c); }
   static V add(V a, V b) { return _mm512_add_pd(a, b); }
   static V zero() { return _mm512_setzero_pd(); }
+  static V mul(V a, V b) { return _mm512_mul_pd(a, b); }
+  static V negative(V a) { return _mm512_sub_pd(zero(), a); }
+  static double root(double number) {
+    return _mm_cvtsd_f64(_mm_sqrt_sd(_mm_setzero_pd(), _mm_set_sd(number)));
+  }
+  static constexpr double kHuge = __DBL_MAX__;
 
   template <int K>
   __attribute__((always_inline)) static inline void sum(const V (&v)[K], double* out) {

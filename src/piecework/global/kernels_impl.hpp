@@ -3,8 +3,8 @@
 // could be chosen by the linker for everyone.
 //
 // A type of vectors S has: Number, V, kSize (numbers per vector), kStrip (columns per strip), load,
-// store, load_some(p, n), store_some(p, v, n) for n < kSize, repeat(number), fma, add, zero and
-// sum<K>(v, out): out[k] = the sum of the numbers of v[k].
+// store, load_some(p, n), store_some(p, v, n) for n <= kSize, repeat(number), fma, add, mul,
+// negative, zero, root(number) and sum<K>(v, out): out[k] = the sum of the numbers of v[k].
 
 namespace {
 
@@ -219,10 +219,174 @@ struct Sweep {
 };
 
 template <class S>
+struct Dense {
+  using T = typename S::Number;
+  using V = typename S::V;
+  static constexpr int kSize = S::kSize;
+  static constexpr int kBlock = 8;  ///< columns eliminated at a time
+
+  /// Unblocked Cholesky of a K x K block; reciprocal pivots to `inverse`.
+  static bool factor_block(T* a, int ld, int cols, T* inverse) {
+    for (int c = 0; c < cols; ++c) {
+      T pivot = a[c + c * ld];
+      for (int k = 0; k < c; ++k) pivot -= a[c + k * ld] * a[c + k * ld];
+      if (!(pivot > T(0)) || !(pivot < S::kHuge)) return false;
+      const T root = S::root(pivot);
+      a[c + c * ld] = root;
+      inverse[c] = T(1) / root;
+      for (int r = c + 1; r < cols; ++r) {
+        T value = a[r + c * ld];
+        for (int k = 0; k < c; ++k) value -= a[r + k * ld] * a[c + k * ld];
+        a[r + c * ld] = value * inverse[c];
+      }
+    }
+    return true;
+  }
+
+  /// Rows r ... r + count - 1 of the columns below a factored block: X = X L^-T, and their
+  /// transpose to `transposed` (K numbers per row).
+  template <int K>
+  static void solve_block(T* a, int ld, const T* inverse, int block_row, int r, int count,
+                          T* transposed) {
+    V x[K];
+    unroll<K>([&](auto c) PIECEWORK_INLINE {
+      x[c] = S::load_some(a + r + static_cast<long>(c) * ld, count);
+    });
+    unroll<K>([&](auto c) PIECEWORK_INLINE {
+      unroll<c>([&](auto k) PIECEWORK_INLINE {
+        x[c] = S::fma(S::repeat(-a[block_row + c + static_cast<long>(k) * ld]), x[k], x[c]);
+      });
+      x[c] = S::mul(x[c], S::repeat(inverse[c]));
+    });
+    unroll<K>([&](auto c) PIECEWORK_INLINE {
+      S::store_some(a + r + static_cast<long>(c) * ld, x[c], count);
+    });
+    for (int i = 0; i < count; ++i)
+      for (int c = 0; c < K; ++c) transposed[i * K + c] = a[r + i + static_cast<long>(c) * ld];
+  }
+
+  /// Columns first ... end - 1 less L L^T, from the chunk of each column's diagonal down. `l`: K
+  /// columns of L, `transposed`: their rows from `first` on.
+  template <int K>
+  static void update(T* a, const T* l, int ld, int rows, int first, int end, const T* transposed) {
+    for (int r = first / kSize * kSize; r < rows; r += kSize) {
+      V x[K];
+      unroll<K>([&](auto k) PIECEWORK_INLINE {
+        x[k] = S::negative(S::load(l + r + static_cast<long>(k) * ld));
+      });
+      const int last = r + kSize < end ? r + kSize : end;
+      const T* t = transposed;
+      T* column = a + r + static_cast<long>(first) * ld;
+      for (int c = first; c < last; ++c) {
+        V sum = S::load(column);
+        unroll<K>([&](auto k) PIECEWORK_INLINE { sum = S::fma(x[k], S::repeat(t[k]), sum); });
+        S::store(column, sum);
+        column += ld;
+        t += K;
+      }
+    }
+  }
+
+  template <int K>
+  static bool eliminate_block(T* a, int rows, int ld, int c, int end, T* work) {
+    T inverse[K];
+    T* l = a + static_cast<long>(c) * ld;
+    if (!factor_block(l + c, ld, K, inverse)) return false;
+    const int below = c + K;
+    int r = below;
+    while (r < rows) {  // up to the next whole chunk, then chunk by chunk
+      int stop = r / kSize * kSize + kSize;
+      if (stop > rows) stop = rows;
+      solve_block<K>(l, ld, inverse, c, r, stop - r, work + static_cast<long>(r - below) * K);
+      r = stop;
+    }
+    update<K>(a, l, ld, rows, below, end, work);
+    return true;
+  }
+
+  template <int K>
+  static bool eliminate_last(int count, T* a, int rows, int ld, int c, int end, T* work) {
+    if constexpr (K == 0) {
+      return true;
+    } else {
+      if (count == K) return eliminate_block<K>(a, rows, ld, c, end, work);
+      return eliminate_last<K - 1>(count, a, rows, ld, c, end, work);
+    }
+  }
+
+  static bool eliminate(T* a, int rows, int ld, int first, int last, int end, T* work) {
+    int c = first;
+    for (; c + kBlock <= last; c += kBlock)
+      if (!eliminate_block<kBlock>(a, rows, ld, c, end, work)) return false;
+    return eliminate_last<kBlock - 1>(last - c, a, rows, ld, c, end, work);
+  }
+
+  /// Chunks of rows at once, so that each number of L is fetched once for all of them.
+  template <int kChunks>
+  static void solve_right_rows(const T* l, int ldl, int width, T* x, int ldx) {
+    for (int c = width - 1; c >= 0; --c) {
+      const T* column = l + static_cast<long>(c) * ldl;
+      V sum[kChunks];
+      V other[kChunks];
+      unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
+        sum[i] = S::load(x + i * kSize + static_cast<long>(c) * ldx);
+        other[i] = S::zero();
+      });
+      int k = c + 1;
+      for (; k + 1 < width; k += 2) {
+        const V factor = S::repeat(-column[k]);
+        const V factor2 = S::repeat(-column[k + 1]);
+        const T* from = x + static_cast<long>(k) * ldx;
+        unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
+          sum[i] = S::fma(S::load(from + i * kSize), factor, sum[i]);
+          other[i] = S::fma(S::load(from + ldx + i * kSize), factor2, other[i]);
+        });
+      }
+      if (k < width) {
+        const V factor = S::repeat(-column[k]);
+        unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
+          sum[i] = S::fma(S::load(x + i * kSize + static_cast<long>(k) * ldx), factor, sum[i]);
+        });
+      }
+      const V scale = S::repeat(T(1) / column[c]);
+      unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
+        S::store(x + i * kSize + static_cast<long>(c) * ldx,
+                 S::mul(S::add(sum[i], other[i]), scale));
+      });
+    }
+  }
+
+  static void solve_right(const T* l, int ldl, int width, T* x, int ldx, int rows) {
+    int r = 0;
+    for (; r + 4 * kSize <= rows; r += 4 * kSize) solve_right_rows<4>(l, ldl, width, x + r, ldx);
+    for (; r + 2 * kSize <= rows; r += 2 * kSize) solve_right_rows<2>(l, ldl, width, x + r, ldx);
+    if (r < rows) solve_right_rows<1>(l, ldl, width, x + r, ldx);
+  }
+
+  static void square(const T* y, int ldy, int width, T* z, int ldz, T* work) {
+    // Column c of Z: the rows of Y from c on, each times its number in column c.
+    for (int c = 0; c < width; ++c)
+      for (int r = 0; r < width; ++r)
+        work[c + static_cast<long>(r) * ldy] = y[r + static_cast<long>(c) * ldy];
+    for (int c = 0; c < width; ++c)
+      for (int r = 0; r < width; r += kSize) {
+        V sum = S::zero();
+        for (int k = c; k < width; ++k)
+          sum = S::fma(S::load(work + r + static_cast<long>(k) * ldy),
+                       S::repeat(y[k + static_cast<long>(c) * ldy]), sum);
+        S::store(z + r + static_cast<long>(c) * ldz, sum);
+      }
+  }
+
+  static constexpr DenseKernels<T> table() { return {eliminate, solve_right, square}; }
+};
+
+template <class S>
 constexpr Kernels<typename S::Number> kernels_of() {
   return {{S::kStrip, S::kSize, 64 / static_cast<int>(sizeof(typename S::Number))},
           Sweep<S, 1>::table(),
-          Sweep<S, kMaxLanes>::table()};
+          Sweep<S, kMaxLanes>::table(),
+          Dense<S>::table()};
 }
 
 }  // namespace

@@ -37,6 +37,19 @@ struct Plain4 {
     return b;
   }
   static V zero() { return {}; }
+  static V mul(const V& a, V b) {
+    for (int i = 0; i < 4; ++i) b.v[i] *= a.v[i];
+    return b;
+  }
+  static V negative(V a) {
+    for (int i = 0; i < 4; ++i) a.v[i] = -a.v[i];
+    return a;
+  }
+  static Float root(Float number) {
+    if constexpr (sizeof(Float) == 4) return __builtin_sqrtf(number);
+    return static_cast<Float>(__builtin_sqrt(static_cast<double>(number)));
+  }
+  static constexpr Float kHuge = sizeof(Float) == 4 ? Float(__FLT_MAX__) : Float(__DBL_MAX__);
 
   template <int K>
   __attribute__((always_inline)) static inline void sum(const V (&v)[K], Float* out) {

@@ -55,7 +55,7 @@ FrontEntries scatter_entries(const SymmetricPattern& pattern, const Symbolic& sy
       [&](std::size_t f) {
         const Front& front = symbolic.fronts[f];
         const auto rows = symbolic.front_rows(front);
-        const auto size = static_cast<unsigned>(front.width + front.num_rows);
+        const auto stride = static_cast<unsigned>(front_stride(front.width + front.num_rows));
         for (std::size_t e = result.begin[f]; e < result.begin[f + 1]; ++e) {
           const int row = row_of[e];
           const auto local = static_cast<unsigned>(
@@ -63,7 +63,7 @@ FrontEntries scatter_entries(const SymmetricPattern& pattern, const Symbolic& sy
                   ? row - front.first
                   : front.width + (std::lower_bound(rows.begin(), rows.end(), row) - rows.begin()));
           const unsigned column = result.entries[e].offset - static_cast<unsigned>(front.first);
-          result.entries[e].offset = local + column * size;
+          result.entries[e].offset = local + column * stride;
         }
       },
       16);
@@ -78,6 +78,10 @@ constexpr int kTile = 192;
 /// Fronts below this many rows are worked on by one thread.
 constexpr int kTiledFront = 2 * kTile;
 
+/// Up to this many rows our own kernels do everything; beyond, BLAS updates what is right of a
+/// panel.
+constexpr int kSmallFront = 224;
+
 /// A front's matrix: (width + rows)^2, column-major, lower triangle.
 template <class N>
 struct FrontMatrix {
@@ -85,8 +89,13 @@ struct FrontMatrix {
   int width;
   int rows;
   [[nodiscard]] int size() const { return width + rows; }
+  [[nodiscard]] int stride() const { return front_stride(size()); }
   [[nodiscard]] N* at(int row, int column) const {
-    return data + static_cast<std::size_t>(column) * static_cast<std::size_t>(size()) + row;
+    return data + static_cast<std::size_t>(column) * static_cast<std::size_t>(stride()) + row;
+  }
+  [[nodiscard]] static std::size_t numbers(const Front& front) {
+    const int size = front.width + front.num_rows;
+    return static_cast<std::size_t>(size) * static_cast<std::size_t>(front_stride(size));
   }
 };
 
@@ -94,18 +103,23 @@ template <class T, class N>
 class Factorizer {
  public:
   Factorizer(const NumericInput& input, TreeFactor<T>& factor)
-      : input_(input), symbolic_(*input.symbolic), plan_(*input.plan), factor_(factor) {}
+      : input_(input),
+        symbolic_(*input.symbolic),
+        plan_(*input.plan),
+        kernels_(kernels<N>(input.isa).dense),
+        factor_(factor) {}
 
   FactorOutcome run();
 
  private:
   struct Scratch {
-    AlignedArray<N> front, panel;
+    AlignedArray<N> front, panel, transposed;
     std::vector<int> relative;
     AlignedArray<N> stack;
     FactorOutcome outcome;
     N* front_of(std::size_t count) { return grow(front, count); }
     N* panel_of(std::size_t count) { return grow(panel, count); }
+    N* transposed_of(std::size_t count) { return grow(transposed, count); }
     static N* grow(AlignedArray<N>& array, std::size_t count) {
       if (array.size() < count) array = AlignedArray<N>(count);
       return array.data();
@@ -122,39 +136,39 @@ class Factorizer {
                   std::vector<int>& relative);
   bool eliminate(int f, const FrontMatrix<N>& matrix, bool tiled, Scratch& scratch);
   void update_trailing(const FrontMatrix<N>& matrix, int first, int end, bool tiled);
-  void store_panel(std::size_t p, const FrontMatrix<N>& matrix, double norm, Scratch& scratch);
+  void store_panel(std::size_t p, const FrontMatrix<N>& matrix, double diagonal, Scratch& scratch);
   void pack(const N* from, int ld, int rows, int cols, N sign, T* to) const;
-  static double norm1(int n, const N* a, int lda);
   void note(const FactorOutcome& part, FactorOutcome& whole) const;
 
   const NumericInput& input_;
   const Symbolic& symbolic_;
   const TreePlan& plan_;
+  const DenseKernels<N>& kernels_;
   TreeFactor<T>& factor_;
   std::vector<AlignedArray<N>> updates_;  ///< of roots of subtrees and of fronts above them
 };
 
-/// 1-norm of a symmetric matrix given by its lower triangle.
-template <class T, class N>
-double Factorizer<T, N>::norm1(int n, const N* a, int lda) {
-  std::vector<double> sum(static_cast<std::size_t>(n), 0.0);
+/// Largest sum of magnitudes of a column.
+template <class N>
+double norm1(int n, const N* a, int lda) {
+  N largest = 0;
   for (int c = 0; c < n; ++c) {
     const N* column = a + static_cast<std::size_t>(c) * static_cast<std::size_t>(lda);
-    double below = std::abs(static_cast<double>(column[c]));
-    for (int r = c + 1; r < n; ++r) {
-      const double value = std::abs(static_cast<double>(column[r]));
-      below += value;
-      sum[static_cast<std::size_t>(r)] += value;
-    }
-    sum[static_cast<std::size_t>(c)] += below;
+    N sums[8] = {};
+    int r = 0;
+    for (; r + 8 <= n; r += 8)
+      for (int i = 0; i < 8; ++i) sums[i] += std::abs(column[r + i]);
+    N sum = 0;
+    for (; r < n; ++r) sum += std::abs(column[r]);
+    for (const N part : sums) sum += part;
+    largest = sum > largest || std::isnan(sum) ? sum : largest;
   }
-  return n > 0 ? *std::max_element(sum.begin(), sum.end()) : 0.0;
+  return static_cast<double>(largest);
 }
 
 template <class T, class N>
 void Factorizer<T, N>::assemble(int f, const FrontMatrix<N>& matrix) {
-  const auto size = static_cast<std::size_t>(matrix.size());
-  std::memset(matrix.data, 0, size * size * sizeof(N));
+  std::memset(matrix.data, 0, FrontMatrix<N>::numbers(front(f)) * sizeof(N));
   const FrontEntries& entries = *input_.entries;
   for (std::size_t e = entries.begin[static_cast<std::size_t>(f)];
        e < entries.begin[static_cast<std::size_t>(f) + 1]; ++e)
@@ -202,8 +216,8 @@ void Factorizer<T, N>::update_trailing(const FrontMatrix<N>& matrix, int first, 
   const int depth = end - first;
   if (rest == 0) return;
   if (!tiled) {
-    dense::subtract_square<N>(rest, depth, matrix.at(end, first), matrix.size(),
-                              matrix.at(end, end), matrix.size());
+    dense::subtract_square<N>(rest, depth, matrix.at(end, first), matrix.stride(),
+                              matrix.at(end, end), matrix.stride());
     return;
   }
   const int blocks = (rest + kTile - 1) / kTile;
@@ -220,12 +234,12 @@ void Factorizer<T, N>::update_trailing(const FrontMatrix<N>& matrix, int first, 
         const int rows = std::min(kTile, matrix.size() - r);
         const int cols = std::min(kTile, matrix.size() - c);
         if (row == column)
-          dense::subtract_square<N>(rows, depth, matrix.at(r, first), matrix.size(),
-                                    matrix.at(r, c), matrix.size());
+          dense::subtract_square<N>(rows, depth, matrix.at(r, first), matrix.stride(),
+                                    matrix.at(r, c), matrix.stride());
         else
-          dense::subtract_product<N>(rows, cols, depth, matrix.at(r, first), matrix.size(),
-                                     matrix.at(c, first), matrix.size(), matrix.at(r, c),
-                                     matrix.size());
+          dense::subtract_product<N>(rows, cols, depth, matrix.at(r, first), matrix.stride(),
+                                     matrix.at(c, first), matrix.stride(), matrix.at(r, c),
+                                     matrix.stride());
       },
       1);
 }
@@ -249,9 +263,10 @@ void Factorizer<T, N>::pack(const N* from, int ld, int rows, int cols, N sign, T
   }
 }
 
-/// Writes panel p, whose columns of L are done, in the form that the sweeps read.
+/// Writes panel p, whose columns of L are done, in the form that the sweeps read. `diagonal`: the
+/// largest entry that D had on its diagonal.
 template <class T, class N>
-void Factorizer<T, N>::store_panel(std::size_t p, const FrontMatrix<N>& matrix, double norm,
+void Factorizer<T, N>::store_panel(std::size_t p, const FrontMatrix<N>& matrix, double diagonal,
                                    Scratch& scratch) {
   const Panel& panel = plan_.panels[p];
   const int cols = panel.cols;
@@ -259,31 +274,37 @@ void Factorizer<T, N>::store_panel(std::size_t p, const FrontMatrix<N>& matrix, 
   const N* l_below = matrix.at(panel.first + cols, panel.first);
   T* own = factor_.numbers.data() + panel.own;
   T* below = factor_.numbers.data() + panel.below;
+  // X = [I; L_below] L_own^-1 holds L_own^-1 and B.
+  const int own_stride = front_stride(cols);
+  const int below_stride = front_stride(panel.rows);
   const auto size = static_cast<std::size_t>(cols);
-  N* inverse = scratch.panel_of(size * (size + static_cast<std::size_t>(panel.rows)));
-  for (std::size_t c = 0; c < size; ++c)
-    std::copy_n(l_own + c * static_cast<std::size_t>(matrix.size()), cols, inverse + c * size);
-  dense::invert_from_cholesky<N>(cols, inverse, cols);
-  const double condition = norm * norm1(cols, inverse, cols);
+  N* x = scratch.panel_of(size * static_cast<std::size_t>(3 * own_stride + below_stride));
+  N* inverse = x + size * static_cast<std::size_t>(own_stride);
+  N* work = inverse + size * static_cast<std::size_t>(own_stride);
+  N* b = work + size * static_cast<std::size_t>(own_stride);
+  std::memset(x, 0, size * static_cast<std::size_t>(own_stride) * sizeof(N));
+  for (std::size_t c = 0; c < size; ++c) x[c * static_cast<std::size_t>(own_stride) + c] = N(1);
+  kernels_.solve_right(l_own, matrix.stride(), cols, x, own_stride, own_stride);
+  kernels_.square(x, own_stride, cols, inverse, own_stride, work);
+  const double condition = diagonal * norm1(cols, inverse, own_stride);
   const bool substitute = !(condition <= input_.condition_limit);
   factor_.substituted[p] = substitute;
   if (substitute) {
     ++scratch.outcome.substituted_panels;
-    pack(l_own, matrix.size(), cols, cols, N(1), own);
-    pack(l_below, matrix.size(), panel.rows, cols, N(-1), below);
+    pack(l_own, matrix.stride(), cols, cols, N(1), own);
+    pack(l_below, matrix.stride(), panel.rows, cols, N(-1), below);
     return;
   }
   scratch.outcome.max_condition = std::max(scratch.outcome.max_condition, condition);
-  for (std::size_t c = 0; c < size; ++c)
-    for (std::size_t r = 0; r < c; ++r) inverse[c * size + r] = inverse[r * size + c];
-  pack(inverse, cols, cols, cols, N(1), own);
+  pack(inverse, own_stride, cols, cols, N(1), own);
   if (panel.rows == 0) return;
-  N* b = inverse + size * size;
-  const auto rows = static_cast<std::size_t>(panel.rows);
-  for (std::size_t c = 0; c < size; ++c)
-    std::copy_n(l_below + c * static_cast<std::size_t>(matrix.size()), rows, b + c * rows);
-  dense::solve_right<N>(panel.rows, cols, l_own, matrix.size(), b, panel.rows);
-  pack(b, panel.rows, panel.rows, cols, N(-1), below);
+  for (std::size_t c = 0; c < size; ++c) {
+    N* column = b + c * static_cast<std::size_t>(below_stride);
+    std::copy_n(l_below + c * static_cast<std::size_t>(matrix.stride()), panel.rows, column);
+    std::fill(column + panel.rows, column + below_stride, N(0));
+  }
+  kernels_.solve_right(l_own, matrix.stride(), cols, b, below_stride, below_stride);
+  pack(b, below_stride, panel.rows, cols, N(-1), below);
 }
 
 /// Factors the front's own columns, panel by panel; its update matrix is left below them.
@@ -291,38 +312,25 @@ template <class T, class N>
 bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled,
                                  Scratch& scratch) {
   const FrontPlan& plan = plan_.fronts[static_cast<std::size_t>(f)];
+  N* work = scratch.transposed_of(8 * static_cast<std::size_t>(matrix.size()));
   for (int k = 0; k < plan.num_panels; ++k) {
     const std::size_t p = plan.first_panel + static_cast<std::size_t>(k);
     const Panel& panel = plan_.panels[p];
     const int end = panel.first + panel.cols;
-    const int below = matrix.size() - end;
-    N* pivot = matrix.at(panel.first, panel.first);
-    const double norm = norm1(panel.cols, pivot, matrix.size());
-    if (!dense::cholesky<N>(panel.cols, pivot, matrix.size())) return false;
-    for (int c = 0; c < panel.cols; ++c) {
-      const auto diagonal = static_cast<double>(*matrix.at(panel.first + c, panel.first + c));
-      if (!(diagonal > 0) || !std::isfinite(diagonal)) return false;  // BLAS lets NaN through
-      scratch.outcome.min_pivot = std::min(scratch.outcome.min_pivot, diagonal);
-      scratch.outcome.max_pivot = std::max(scratch.outcome.max_pivot, diagonal);
+    double diagonal = 0;
+    for (int c = panel.first; c < end; ++c)
+      diagonal = std::max(diagonal, static_cast<double>(*matrix.at(c, c)));
+    const bool small = matrix.size() <= kSmallFront;
+    if (!kernels_.eliminate(matrix.at(0, 0), matrix.size(), matrix.stride(), panel.first, end,
+                            small ? matrix.size() : end, work))
+      return false;
+    for (int c = panel.first; c < end; ++c) {
+      const auto pivot = static_cast<double>(*matrix.at(c, c));
+      scratch.outcome.min_pivot = std::min(scratch.outcome.min_pivot, pivot);
+      scratch.outcome.max_pivot = std::max(scratch.outcome.max_pivot, pivot);
     }
-    if (below > 0) {
-      if (tiled) {
-        parallel_for(
-            static_cast<std::size_t>((below + kTile - 1) / kTile),
-            [&](std::size_t tile) {
-              const int r = end + static_cast<int>(tile) * kTile;
-              dense::solve_right_transposed<N>(std::min(kTile, matrix.size() - r), panel.cols,
-                                               pivot, matrix.size(), matrix.at(r, panel.first),
-                                               matrix.size());
-            },
-            1);
-      } else {
-        dense::solve_right_transposed<N>(below, panel.cols, pivot, matrix.size(),
-                                         matrix.at(end, panel.first), matrix.size());
-      }
-    }
-    update_trailing(matrix, panel.first, end, tiled);
-    store_panel(p, matrix, norm, scratch);
+    if (!small) update_trailing(matrix, panel.first, end, tiled);
+    store_panel(p, matrix, diagonal, scratch);
   }
   return true;
 }
@@ -345,8 +353,8 @@ void Factorizer<T, N>::factor_subtree(const Subtree& subtree, Scratch& scratch) 
   N* top = stack;
   for (int f = subtree.first_front; f <= subtree.last_front; ++f) {
     const Front& current = front(f);
-    const auto size = static_cast<std::size_t>(current.width + current.num_rows);
-    const FrontMatrix<N> matrix{scratch.front_of(size * size), current.width, current.num_rows};
+    const FrontMatrix<N> matrix{scratch.front_of(FrontMatrix<N>::numbers(current)), current.width,
+                                current.num_rows};
     assemble(f, matrix);
     // Children lie on the stack in order; the first one deepest.
     const auto& children = plan_.children[static_cast<std::size_t>(f)];
@@ -378,8 +386,8 @@ void Factorizer<T, N>::factor_subtree(const Subtree& subtree, Scratch& scratch) 
 template <class T, class N>
 void Factorizer<T, N>::factor_top(int f, Scratch& scratch) {
   const Front& current = front(f);
-  const auto size = static_cast<std::size_t>(current.width + current.num_rows);
-  const FrontMatrix<N> matrix{scratch.front_of(size * size), current.width, current.num_rows};
+  const FrontMatrix<N> matrix{scratch.front_of(FrontMatrix<N>::numbers(current)), current.width,
+                              current.num_rows};
   assemble(f, matrix);
   for (const int child : plan_.children[static_cast<std::size_t>(f)]) {
     extend_add(child, updates_[static_cast<std::size_t>(child)].data(), f, matrix,
@@ -387,7 +395,10 @@ void Factorizer<T, N>::factor_top(int f, Scratch& scratch) {
     updates_[static_cast<std::size_t>(child)] = {};
   }
   if (f == plan_.boundary_front) {
-    factor_.schur.assign(matrix.data, matrix.data + size * size);
+    const auto size = static_cast<std::size_t>(matrix.size());
+    factor_.schur.resize(size * size);
+    for (std::size_t c = 0; c < size; ++c)
+      std::copy_n(matrix.at(0, static_cast<int>(c)), size, factor_.schur.data() + c * size);
     return;
   }
   if (!eliminate(f, matrix, matrix.size() >= kTiledFront, scratch)) {

@@ -12,10 +12,13 @@
 
 namespace piecework::global {
 
+/// From column to column of a front's matrix of `size` rows.
+inline int front_stride(int size) { return (size + 15) / 16 * 16; }
+
 /// Where a value of the matrix goes in its front.
 struct FrontEntry {
   int value;        ///< index into the matrix's values
-  unsigned offset;  ///< row + column * (width + rows) in the front
+  unsigned offset;  ///< row + column * front_stride(width + rows) in the front
 };
 
 /// The entries of every front, found once per pattern.
@@ -31,7 +34,9 @@ struct FactorOutcome {
   SolveStatus status = SolveStatus::Ok;
   double min_pivot = 0, max_pivot = 0;  ///< of L's diagonal
   int substituted_panels = 0;           ///< ill-conditioned: kept as L instead of an inverse
-  double max_condition = 0;             ///< largest 1-norm condition of an inverted pivot block
+  /// Largest condition of an inverted pivot block D, estimated as the largest entry on D's diagonal
+  /// times the 1-norm of D^-1.
+  double max_condition = 0;
 };
 
 /// A factor in storage type T, computed in type N.
@@ -50,6 +55,7 @@ struct NumericInput {
   const FrontEntries* entries;
   std::span<const double> values;
   PanelLayout layout;      ///< of the kernels that will read the panels
+  Isa isa;                 ///< for the dense kernels
   double condition_limit;  ///< pivot blocks above are not inverted
 };
 

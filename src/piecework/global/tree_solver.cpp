@@ -109,8 +109,8 @@ struct TreeSolver::Impl {
   template <class T, class N>
   SolveStatus factor_with(std::span<const double> values) {
     NumericInput input{
-        &symbolic,        &engine<T>().plan, &entries, values, engine<T>().kernel_table.layout,
-        condition_limit()};
+        &symbolic, &engine<T>().plan, &entries, values, engine<T>().kernel_table.layout,
+        isa,       condition_limit()};
     const FactorOutcome outcome = factor_tree<T, N>(input, engine<T>().factor);
     factored = outcome.status == SolveStatus::Ok;
     report.substituted_panels = outcome.substituted_panels;

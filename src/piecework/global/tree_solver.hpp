@@ -32,8 +32,9 @@ struct TreeOptions {
   /// With Precision::Single: the factor is redone in 64 bits if the estimated contraction of a
   /// solve is worse (TreeReport::fallback says so). Not positive: no estimate.
   double contraction_limit = 1e-2;
-  /// Pivot blocks with a larger 1-norm condition number are solved by substitution, not inverted:
-  /// explicit inverses are not backward stable. Default by precision: 1e4 and 1e3.
+  /// Pivot blocks D with a larger condition (estimated: largest diagonal entry of D times 1-norm of
+  /// D^-1) are solved by substitution, not inverted: explicit inverses are not backward stable.
+  /// Default by precision: 1e4 and 1e3.
   std::optional<double> condition_limit;
   std::optional<Isa> isa;  ///< default: the best one of this processor
   int seed = 1;            ///< of METIS
@@ -47,7 +48,7 @@ struct TreeReport : FactorReport {
   int levels = 0;    ///< of the top: barriers per sweep
   int panels = 0;
   int substituted_panels = 0;  ///< ill-conditioned, see TreeOptions::condition_limit
-  double max_condition = 0;    ///< largest 1-norm condition number of an inverted pivot block
+  double max_condition = 0;    ///< largest condition of an inverted pivot block, estimated
   Precision precision = Precision::Double;  ///< in use
   double contraction = 0;  ///< estimated energy-norm error of one 32-bit solve; 0 in 64 bits
   std::string fallback;    ///< why 64 bits are in use although 32 were asked for
