@@ -81,6 +81,8 @@ struct DenseKernels {
   /// Z = Y^T Y in full for lower triangular Y (width x width, zero above the diagonal; whole chunks
   /// of rows are read and written). `work`: ldy * width numbers.
   void (*square)(const T* y, int ldy, int width, T* z, int ldz, T* work);
+  /// The lower triangle of B (size x size) is added to A where the runs put its rows and columns.
+  void (*extend_add)(T* a, int lda, const T* b, int size, const RowRun* runs, int num_runs);
 };
 
 /// How panels are stored for an instruction set.

@@ -378,7 +378,31 @@ struct Dense {
       }
   }
 
-  static constexpr DenseKernels<T> table() { return {eliminate, solve_right, square}; }
+  static void add(T* to, const T* from, int count) {
+    int i = 0;
+    for (; i + kSize <= count; i += kSize)
+      S::store(to + i, S::add(S::load(to + i), S::load(from + i)));
+    if (i < count)
+      S::store_some(to + i,
+                    S::add(S::load_some(to + i, count - i), S::load_some(from + i, count - i)),
+                    count - i);
+  }
+
+  static void extend_add(T* a, int lda, const T* b, int size, const RowRun* runs, int num_runs) {
+    for (int k = 0; k < num_runs; ++k)
+      for (int i = 0; i < runs[k].length; ++i) {
+        T* column = a + static_cast<long>(runs[k].start + i) * lda;
+        add(column + runs[k].start + i, b, runs[k].length - i);
+        const T* from = b + (runs[k].length - i);
+        for (int m = k + 1; m < num_runs; ++m) {
+          add(column + runs[m].start, from, runs[m].length);
+          from += runs[m].length;
+        }
+        b += size + 1;  // the next diagonal entry
+      }
+  }
+
+  static constexpr DenseKernels<T> table() { return {eliminate, solve_right, square, extend_add}; }
 };
 
 template <class S>

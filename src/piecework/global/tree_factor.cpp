@@ -114,7 +114,7 @@ class Factorizer {
  private:
   struct Scratch {
     AlignedArray<N> front, panel, transposed;
-    std::vector<int> relative;
+    std::vector<RowRun> runs;
     AlignedArray<N> stack;
     FactorOutcome outcome;
     N* front_of(std::size_t count) { return grow(front, count); }
@@ -133,7 +133,7 @@ class Factorizer {
   void factor_top(int f, Scratch& scratch);
   void assemble(int f, const FrontMatrix<N>& matrix);
   void extend_add(int child, const N* update, int parent, const FrontMatrix<N>& matrix,
-                  std::vector<int>& relative);
+                  std::vector<RowRun>& runs);
   bool eliminate(int f, const FrontMatrix<N>& matrix, bool tiled, Scratch& scratch);
   void update_trailing(const FrontMatrix<N>& matrix, int first, int end, bool tiled);
   void store_panel(std::size_t p, const FrontMatrix<N>& matrix, double diagonal, Scratch& scratch);
@@ -179,32 +179,25 @@ void Factorizer<T, N>::assemble(int f, const FrontMatrix<N>& matrix) {
 /// Adds a child's update matrix, by runs of rows that stay together.
 template <class T, class N>
 void Factorizer<T, N>::extend_add(int child, const N* update, int parent,
-                                  const FrontMatrix<N>& matrix, std::vector<int>& relative) {
+                                  const FrontMatrix<N>& matrix, std::vector<RowRun>& runs) {
   const auto rows = symbolic_.front_rows(front(child));
   const auto parent_rows = symbolic_.front_rows(front(parent));
   const int first = front(parent).first;
-  relative.resize(rows.size());
+  runs.clear();
   std::size_t k = 0;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows[i] < first + matrix.width) {
-      relative[i] = rows[i] - first;
-    } else {
-      while (parent_rows[k] != rows[i]) ++k;
-      relative[i] = matrix.width + static_cast<int>(k);
+  for (const int row : rows) {
+    int place = row - first;
+    if (place >= matrix.width) {
+      while (parent_rows[k] != row) ++k;
+      place = matrix.width + static_cast<int>(k);
     }
+    if (!runs.empty() && runs.back().start + runs.back().length == place)
+      ++runs.back().length;
+    else
+      runs.push_back({place, 1});
   }
-  const std::size_t count = rows.size();
-  for (std::size_t c = 0; c < count; ++c) {
-    const N* from = update + c * count;
-    N* to = matrix.at(0, relative[c]);
-    for (std::size_t r = c; r < count;) {
-      std::size_t end = r + 1;
-      while (end < count && relative[end] == relative[end - 1] + 1) ++end;
-      N* target = to + relative[r];
-      for (std::size_t i = r; i < end; ++i) target[i - r] += from[i];
-      r = end;
-    }
-  }
+  kernels_.extend_add(matrix.data, matrix.stride(), update, static_cast<int>(rows.size()),
+                      runs.data(), static_cast<int>(runs.size()));
 }
 
 /// Lower triangle of everything from row and column `end` on -= L L^T with L's columns
@@ -361,7 +354,7 @@ void Factorizer<T, N>::factor_subtree(const Subtree& subtree, Scratch& scratch) 
     for (const int child : children) top -= square(child);
     const N* update = top;
     for (const int child : children) {
-      extend_add(child, update, f, matrix, scratch.relative);
+      extend_add(child, update, f, matrix, scratch.runs);
       update += square(child);
     }
     if (!eliminate(f, matrix, false, scratch)) {
@@ -390,8 +383,7 @@ void Factorizer<T, N>::factor_top(int f, Scratch& scratch) {
                               current.num_rows};
   assemble(f, matrix);
   for (const int child : plan_.children[static_cast<std::size_t>(f)]) {
-    extend_add(child, updates_[static_cast<std::size_t>(child)].data(), f, matrix,
-               scratch.relative);
+    extend_add(child, updates_[static_cast<std::size_t>(child)].data(), f, matrix, scratch.runs);
     updates_[static_cast<std::size_t>(child)] = {};
   }
   if (f == plan_.boundary_front) {
