@@ -71,7 +71,7 @@ StepReport Integrator::step(State& state) {
                     "check forces, velocities and h = {} s",
                     state.step + 1, h));
   x_ = predicted_;
-  model_.sewing.follow(end, x_);  // the iterations start, and stay, on closed seams
+  model_.sewing.settle(end, model_.mass, fixed, x_);  // where the iterations then stay
   double misc = phase.lap();
 
   StepReport report = minimizer_->minimize({&predicted_, &fixed, &state.x}, x_);

@@ -47,14 +47,39 @@ Eigen::RowVector3d Sewing::carried(const Positions& x, int slave) const {
   return base + offset;
 }
 
+Eigen::RowVector3d Sewing::place(double time, const Positions& x, int slave) const {
+  const double open = openness(time, map_.close_time[at(slave)]);
+  if (open > 0) return carried(x, slave) + open * start_gap_.row(slave);
+  return carried(x, slave);
+}
+
 void Sewing::follow(double time, Positions& x) const {
+  parallel_for(map_.slaves.size(),
+               [&](std::size_t i) { x.row(map_.slaves[i]) = place(time, x, static_cast<int>(i)); });
+}
+
+void Sewing::settle(double time, const Eigen::VectorXd& mass, const std::vector<char>& fixed,
+                    Positions& x) const {
+  if (empty()) return;
+  Positions wanted(map_.num_slaves(), 3);  // m_s (z_s - (T z)_s - o_s)
   parallel_for(map_.slaves.size(), [&](std::size_t i) {
     const int s = static_cast<int>(i);
-    Eigen::RowVector3d place = carried(x, s);
-    const double open = openness(time, map_.close_time[i]);
-    if (open > 0) place += open * start_gap_.row(s);
-    x.row(map_.slaves[i]) = place;
+    const int v = map_.slaves[i];
+    wanted.row(s) = mass[v] * (x.row(v) - place(time, x, s));
   });
+  parallel_for(map_.row.size(), [&](std::size_t v) {
+    if (fixed[v] || load_begin_[v] == load_begin_[v + 1]) return;
+    const auto row = static_cast<Eigen::Index>(v);
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    double total = mass[row];
+    for (int k = load_begin_[v]; k < load_begin_[v + 1]; ++k) {
+      const Load& load = load_[at(k)];
+      sum += load.weight * wanted.row(map_.row[at(load.slave)]);
+      total += load.weight * mass[load.slave];
+    }
+    x.row(row) += sum / total;
+  });
+  follow(time, x);
 }
 
 void Sewing::fold(Positions& f) const {

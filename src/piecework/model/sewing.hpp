@@ -27,6 +27,15 @@ class Sewing {
   /// Puts every slave where its carriers and the time (s) want it; x is |V| x 3, m.
   void follow(double time, Positions& x) const;
 
+  /// Turns a prediction z, in which every vertex moves for itself, into a start for the iterations
+  /// on the seams: carriers that are not held take up, by mass, what their slaves wanted,
+  ///     x_c = z_c + sum_s T_sc m_s (z_s - (T z)_s - o_s) / (m_c + sum_s T_sc m_s),
+  /// then slaves follow. Where vertices coincide this is their common centre of mass, so that a
+  /// seam of coinciding vertices moves as if it were none. \param mass  |V|, kg   \param fixed  per
+  /// vertex: held   \param[in,out] x  z, |V| x 3, m
+  void settle(double time, const Eigen::VectorXd& mass, const std::vector<char>& fixed,
+              Positions& x) const;
+
   /// f <- T^T f in place: what acts on slaves is passed to their carriers, and the rows of slaves
   /// become zero. |V| x 3.
   void fold(Positions& f) const;
@@ -60,6 +69,8 @@ class Sewing {
     double weight;
   };
   [[nodiscard]] Eigen::RowVector3d carried(const Positions& x, int slave) const;
+  /// (T x + o(t))_s.
+  [[nodiscard]] Eigen::RowVector3d place(double time, const Positions& x, int slave) const;
 
   mesh::SeamMap map_;
   Positions start_gap_;  ///< per slave, x_start - T x_start, m; zero if closed from the start

@@ -198,8 +198,8 @@ double patch_test_error(const std::vector<testing::Patch>& patches) {
 }
 
 TEST(Reduction, NestedSeamsPassThePatchTest) {
-  EXPECT_LT(patch_test_error({{0, 0, 1, 1, 5, 5}, {1, 0, 2, 1, 5, 5}}), 1e-12);  // conforming
-  EXPECT_LT(patch_test_error({{0, 0, 1, 1, 5, 5}, {1, 0, 2, 1, 5, 9}}), 1e-12);  // 1 : 2
+  EXPECT_LT(patch_test_error({{0, 0, 1, 1, 5, 5}, {1, 0, 2, 1, 5, 5}}), 1e-12);   // conforming
+  EXPECT_LT(patch_test_error({{0, 0, 1, 1, 5, 5}, {1, 0, 2, 1, 5, 9}}), 1e-12);   // 1 : 2
   EXPECT_LT(patch_test_error({{0, 0, 1, 1, 5, 5}, {1, 0, 2, 1, 5, 33}}), 1e-12);  // 1 : 8
 }
 
