@@ -41,6 +41,10 @@ void print_features(const runner::World& world) {
   print_feature("pins", held > 0,
                 held > 0 ? fmt::format("{} groups, {} vertices", world.pins.size(), held)
                          : "no cloth names `pins`");
+  const mesh::SeamMap& seams = world.model.sewing.map();
+  print_feature("seams", !seams.empty(),
+                seams.empty() ? "the scene names no `seams`"
+                              : fmt::format("{} vertices follow others", seams.num_slaves()));
   print_feature("loads", !world.forces.loads.empty(),
                 world.forces.loads.empty() ? "no cloth names `loads`"
                                            : fmt::format("{} patches", world.forces.loads.size()));

@@ -290,7 +290,8 @@ TEST_F(Cli, SchemaEnvAndScenesAreMachineReadable) {
   EXPECT_TRUE(nlohmann::json::parse(call("schema").out).contains("$schema"));
   EXPECT_TRUE(nlohmann::json::parse(call("env").out).contains("compiler"));
   const std::string scenes = call("scenes").out;
-  for (const char* name : {"hanging_tablecloth", "flag_in_wind", "trampoline", "two_sheets"})
+  for (const char* name :
+       {"hanging_tablecloth", "flag_in_wind", "sewn_bag", "trampoline", "two_sheets"})
     EXPECT_NE(scenes.find(name), std::string::npos);
 }
 
@@ -344,8 +345,8 @@ TEST_P(ShippedScene, KeepsItsExpectations) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedScene,
-                         ::testing::Values("hanging_tablecloth", "flag_in_wind", "trampoline",
-                                           "two_sheets"),
+                         ::testing::Values("hanging_tablecloth", "flag_in_wind", "sewn_bag",
+                                           "trampoline", "two_sheets"),
                          [](const auto& scene) { return std::string(scene.param); });
 
 }  // namespace

@@ -137,7 +137,8 @@ void take_pictures(const runner::World& world, const std::vector<Shot>& shots,
   style.value_high = round_up(std::max(extent.strain, kLeastStrain));
   const render::Camera camera =
       make_camera(world.scene.camera, extent, static_cast<double>(options.width) / options.height);
-  const auto adjacent = decomposition::adjacent_domains(world.domains, world.model.hinges);
+  const auto adjacent =
+      decomposition::adjacent_domains(world.domains, world.model.hinges, world.seam_neighbors);
   const std::vector<render::Rgb> colors =
       render::domain_palette(world.domains.num_domains, adjacent);
   std::vector<render::DofClass> classes;

@@ -46,12 +46,12 @@ std::string VanillaPd::description() const {
 
 void VanillaPd::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;
-  free_ = model::FreeVertices(fixed);
-  increment_.resize(free_.count(), 3);
-  const auto status = solver_.factor(restrict_to_free(K_, free_));
+  reduction_ = model::Reduction(model_, fixed);
+  increment_.resize(reduction_.count(), 3);
+  const auto status = solver_.factor(reduction_.system(K_));
   if (status == global::SolveStatus::OutOfMemory)
     throw SimulationError(
-        fmt::format("the factor of {} unknowns does not fit into memory", free_.count()));
+        fmt::format("the factor of {} unknowns does not fit into memory", reduction_.count()));
   if (status != global::SolveStatus::Ok)
     throw SimulationError(
         "the system matrix is not positive definite; stiffness, density or h are "
@@ -99,16 +99,14 @@ StepReport VanillaPd::minimize(const model::StepProblem& problem, Positions& x) 
 }
 
 void VanillaPd::global_step(Positions& x, StepReport& report) {
-  const auto count = static_cast<std::size_t>(free_.count());
+  const auto count = static_cast<std::size_t>(reduction_.count());
   parallel_for(count, [&](std::size_t i) {
     const auto row = static_cast<Eigen::Index>(i);
-    increment_.row(row) = -gradient_.row(free_.vertex[i]);
+    increment_.row(row) = -reduction_.row(gradient_, static_cast<int>(i));
   });
   if (solver_.solve(increment_) != global::SolveStatus::Ok)
     throw SimulationError("the global solve failed (out of memory)");
-  parallel_for(count, [&](std::size_t i) {
-    x.row(free_.vertex[i]) += increment_.row(static_cast<Eigen::Index>(i));
-  });
+  reduction_.advance(increment_, x);
   const auto row_sq = [&](std::size_t i) {
     return increment_.row(static_cast<Eigen::Index>(i)).squaredNorm();
   };
@@ -119,11 +117,12 @@ void VanillaPd::global_step(Positions& x, StepReport& report) {
 }
 
 double VanillaPd::relative_gradient() const {
-  const auto count = static_cast<std::size_t>(free_.count());
+  const auto count = static_cast<std::size_t>(reduction_.count());
   if (count == 0) return 0;
-  const double sum_sq = parallel_sum<double>(
-      count, [&](std::size_t i) { return gradient_.row(free_.vertex[i]).squaredNorm(); });
-  const double weight = model_.mass.sum() / static_cast<double>(model_.num_vertices()) * gravity_;
+  const double sum_sq = parallel_sum<double>(count, [&](std::size_t i) {
+    return reduction_.row(gradient_, static_cast<int>(i)).squaredNorm();
+  });
+  const double weight = model_.mass.sum() / static_cast<double>(model_.num_free()) * gravity_;
   return std::sqrt(sum_sq / static_cast<double>(count)) / weight;
 }
 

@@ -7,12 +7,13 @@
 
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/local/jacobi.hpp>
-#include <piecework/model/assembly.hpp>
+#include <piecework/model/reduction.hpp>
 #include <piecework/model/stepper.hpp>
 
 namespace piecework::baselines {
 
-/// L-G iteration in increment form: K dx = -grad E(x), x += dx. Monotone in E.
+/// L-G iteration in increment form: K dx = -grad E(x), x += dx, on the unknowns that pins and seams
+/// leave (model::Reduction). Monotone in E.
 class VanillaPd final : public model::Minimizer {
  public:
   /// \param model    must outlive this object
@@ -48,7 +49,7 @@ class VanillaPd final : public model::Minimizer {
   double unit_box_;  ///< largest extent of the start shape, m
   SparseMatrix K_;
   std::vector<char> fixed_;
-  model::FreeVertices free_;
+  model::Reduction reduction_;
   global::CholmodSolver solver_;
   local::JacobiStep local_;
   Positions gradient_;

@@ -30,9 +30,10 @@ void Bisector::extract(std::span<const int> set) {
   set_.neighbor.clear();
   weight_.clear();
   for (const int triangle : set) {
-    for (const int other : graph_.neighbors[static_cast<std::size_t>(triangle)])
-      if (other >= 0 && local_[static_cast<std::size_t>(other)] >= 0)
+    graph_.visit_neighbors(triangle, [&](int other) {
+      if (local_[static_cast<std::size_t>(other)] >= 0)
         set_.neighbor.push_back(local_[static_cast<std::size_t>(other)]);
+    });
     set_.begin.push_back(static_cast<std::int32_t>(set_.neighbor.size()));
     weight_.push_back(graph_.weight[static_cast<std::size_t>(triangle)]);
   }

@@ -9,13 +9,27 @@
 #include <vector>
 
 #include <piecework/graph/graph.hpp>
+#include <piecework/mesh/topology.hpp>
 
 namespace piecework::decomposition {
 
-/// Triangles as a graph: edge neighbours (-1 where there is none) and integer weights.
+/// Triangles as a graph: edge neighbours (-1 where there is none), neighbours across seams, and
+/// integer weights.
 struct TriangleGraph {
   std::vector<std::array<int, 3>> neighbors;
+  mesh::Adjacency across;  ///< per triangle; empty: no seams
   std::vector<std::int32_t> weight;
+
+  /// Calls visit(other) for every neighbour of a triangle.
+  template <class Visit>
+  void visit_neighbors(int triangle, const Visit& visit) const {
+    const auto t = static_cast<std::size_t>(triangle);
+    for (const int other : neighbors[t])
+      if (other >= 0) visit(other);
+    if (across.begin.empty()) return;
+    for (int k = across.begin[t]; k < across.begin[t + 1]; ++k)
+      visit(across.item[static_cast<std::size_t>(k)]);
+  }
 };
 
 /// Splits connected sets of triangles into two connected parts, reusing its buffers.

@@ -19,6 +19,26 @@ bool bends(const Elements& elements, std::size_t hinge) {
   return elements.hinge_bends.empty() || elements.hinge_bends[hinge] != 0;
 }
 
+/// Neighbours across seams, without those that share an edge anyway.
+mesh::Adjacency link_across(const TriangleGraph& graph, std::span<const std::array<int, 2>> pairs) {
+  std::vector<std::array<int, 2>> links;
+  for (const auto& [t0, t1] : pairs) {
+    const auto& known = graph.neighbors[static_cast<std::size_t>(t0)];
+    if (std::find(known.begin(), known.end(), t1) != known.end()) continue;
+    links.push_back({t0, t1});
+    links.push_back({t1, t0});
+  }
+  std::sort(links.begin(), links.end());
+  mesh::Adjacency across;
+  across.begin.assign(graph.neighbors.size() + 1, 0);
+  for (const auto& link : links) {
+    ++across.begin[static_cast<std::size_t>(link[0]) + 1];
+    across.item.push_back(link[1]);
+  }
+  std::partial_sum(across.begin.begin(), across.begin.end(), across.begin.begin());
+  return across;
+}
+
 /// A hinge's work is shared by its two triangles, so a triangle weighs 2 and a hinge 1 on each
 /// side.
 TriangleGraph build_graph(const Elements& elements) {
@@ -39,6 +59,7 @@ TriangleGraph build_graph(const Elements& elements) {
     ++graph.weight[static_cast<std::size_t>(t0)];
     ++graph.weight[static_cast<std::size_t>(t1)];
   }
+  if (!elements.seam_neighbors.empty()) graph.across = link_across(graph, elements.seam_neighbors);
   return graph;
 }
 
@@ -60,15 +81,15 @@ std::vector<Piece> connected_components(const TriangleGraph& graph) {
     stack.assign(1, static_cast<int>(start));
     seen[start] = 1;
     while (!stack.empty()) {
-      const auto current = static_cast<std::size_t>(stack.back());
+      const int current = stack.back();
       stack.pop_back();
-      piece.triangles.push_back(static_cast<int>(current));
-      piece.weight += graph.weight[current];
-      for (const int next : graph.neighbors[current]) {
-        if (next < 0 || seen[static_cast<std::size_t>(next)]) continue;
+      piece.triangles.push_back(current);
+      piece.weight += graph.weight[static_cast<std::size_t>(current)];
+      graph.visit_neighbors(current, [&](int next) {
+        if (seen[static_cast<std::size_t>(next)]) return;
         seen[static_cast<std::size_t>(next)] = 1;
         stack.push_back(next);
-      }
+      });
     }
     std::sort(piece.triangles.begin(), piece.triangles.end());
     pieces.push_back(std::move(piece));
@@ -184,14 +205,20 @@ void own_hinges(const Elements& elements, Decomposition& result) {
   });
 }
 
-/// Calls visit(vertex, domain) for every vertex of every constraint.
+/// Calls visit(vertex, domain) for every vertex that a constraint acts on.
 template <class Visit>
 void for_each_incidence(const Elements& elements, const Decomposition& result, const Visit& visit) {
+  const auto visit_carriers = [&](int vertex, int domain) {
+    if (elements.seams == nullptr) return visit(vertex, domain);
+    elements.seams->visit_carriers(vertex, [&](int carrier, double) { visit(carrier, domain); });
+  };
   for (std::size_t t = 0; t < elements.triangles.size(); ++t)
-    for (const int vertex : elements.triangles[t]) visit(vertex, result.triangle_domain[t]);
+    for (const int vertex : elements.triangles[t])
+      visit_carriers(vertex, result.triangle_domain[t]);
   for (std::size_t h = 0; h < elements.hinges.size(); ++h)
     if (bends(elements, h))
-      for (const int vertex : elements.hinges[h].vertices) visit(vertex, result.hinge_domain[h]);
+      for (const int vertex : elements.hinges[h].vertices)
+        visit_carriers(vertex, result.hinge_domain[h]);
 }
 
 /// Domains of each vertex: counted, filled, then sorted and made unique in place.
@@ -247,6 +274,9 @@ void place_vertices(const Elements& elements, Decomposition& result) {
         result.nodes, result.vertex_domains.item[static_cast<std::size_t>(first)],
         result.vertex_domains.item[static_cast<std::size_t>(last) - 1]);
   });
+  if (elements.seams == nullptr) return;
+  for (const int slave : elements.seams->slaves)
+    result.vertex_node[static_cast<std::size_t>(slave)] = -1;
 }
 
 }  // namespace
@@ -297,7 +327,8 @@ Summary summarize(const Decomposition& decomposition, const Elements& elements) 
     summary.corner += dof == DofClass::Corner;
     summary.boundary += dof != DofClass::Internal;
   }
-  summary.remainder = elements.num_vertices - summary.corner;
+  const int slaves = elements.seams == nullptr ? 0 : elements.seams->num_slaves();
+  summary.remainder = elements.num_vertices - slaves - summary.corner;
 
   std::vector<std::int64_t> constraints(static_cast<std::size_t>(summary.domains), 0);
   for (const int domain : decomposition.triangle_domain)
@@ -316,14 +347,17 @@ Summary summarize(const Decomposition& decomposition, const Elements& elements) 
 
 std::string library_version() { return graph::metis_version(); }
 
-std::vector<std::array<int, 2>> adjacent_domains(const Decomposition& decomposition,
-                                                 std::span<const mesh::Hinge> hinges) {
+std::vector<std::array<int, 2>> adjacent_domains(
+    const Decomposition& decomposition, std::span<const mesh::Hinge> hinges,
+    std::span<const std::array<int, 2>> seam_neighbors) {
   std::vector<std::array<int, 2>> pairs;
-  for (const mesh::Hinge& hinge : hinges) {
-    const int a = decomposition.triangle_domain[static_cast<std::size_t>(hinge.triangles[0])];
-    const int b = decomposition.triangle_domain[static_cast<std::size_t>(hinge.triangles[1])];
+  const auto add = [&](const std::array<int, 2>& triangles) {
+    const int a = decomposition.triangle_domain[static_cast<std::size_t>(triangles[0])];
+    const int b = decomposition.triangle_domain[static_cast<std::size_t>(triangles[1])];
     if (a != b) pairs.push_back({std::min(a, b), std::max(a, b)});
-  }
+  };
+  for (const mesh::Hinge& hinge : hinges) add(hinge.triangles);
+  for (const auto& triangles : seam_neighbors) add(triangles);
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   return pairs;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <piecework/core/types.hpp>
+#include <piecework/mesh/seams.hpp>
 #include <piecework/mesh/topology.hpp>
 
 namespace piecework::decomposition {
@@ -24,6 +25,11 @@ struct Elements {
   /// Per hinge: 1 if it carries a bending constraint. Empty: all do.
   std::span<const std::uint8_t> hinge_bends;
   int num_vertices = 0;
+  /// Vertices that follow others: a constraint acts on what carries its vertices. Null: none.
+  const mesh::SeamMap* seams = nullptr;
+  /// Pairs of triangles that face each other across seams (mesh::seam_neighbors), neighbours like
+  /// those that share an edge: what is sewn together is divided together.
+  std::span<const std::array<int, 2>> seam_neighbors;
 };
 
 /// Seed handed to METIS; recorded in run.json. Chosen.
@@ -46,7 +52,7 @@ struct TreeNode {
 /// How many domains a vertex belongs to [Lu25, Sec. 4.1]: one (internal), two (duplicate), more.
 enum class DofClass : std::uint8_t { Internal, Duplicate, Corner };
 
-/// A vertex belongs to every domain that owns a constraint on it.
+/// A vertex belongs to every domain that owns a constraint on it, or on a slave that it carries.
 struct Decomposition {
   int num_domains = 0;
   std::vector<int> triangle_domain;  ///< per triangle
@@ -55,9 +61,10 @@ struct Decomposition {
   std::vector<int> hinge_domain;
   std::vector<TreeNode> nodes;  ///< parents before children; nodes[0] is the root
   /// Per vertex: the deepest node under which all its domains lie. Every constraint's vertices lie
-  /// on one path from its domain's leaf to the root, so `nodes` is an elimination tree of K.
+  /// on one path from its domain's leaf to the root, so `nodes` is an elimination tree of K. With
+  /// seams that holds for what carries them, and of K~ = T^T K T; a slave has no row: -1.
   std::vector<int> vertex_node;
-  mesh::Adjacency vertex_domains;  ///< per vertex: its domains, ascending
+  mesh::Adjacency vertex_domains;  ///< per vertex: its domains, ascending; slaves have none
   int seed = kDefaultSeed;
   std::vector<std::string> notes;  ///< e.g. that fewer domains were made than asked for
 
@@ -69,7 +76,7 @@ struct Summary {
   int domains = 0;
   int corner = 0;             ///< |C|: vertices of more than two domains
   int boundary = 0;           ///< |B|: vertices of more than one domain, corners included
-  int remainder = 0;          ///< |R|: all vertices but the corners
+  int remainder = 0;          ///< |R|: all vertices but corners and slaves
   std::int64_t edge_cut = 0;  ///< interior mesh edges between two domains
   double balance = 1;         ///< largest / mean number of constraints per domain
 };
@@ -86,8 +93,9 @@ Summary summarize(const Decomposition& decomposition, const Elements& elements);
 /// "METIS 5.1.0".
 std::string library_version();
 
-/// Pairs of domains that share a mesh edge, each once, ascending.
-std::vector<std::array<int, 2>> adjacent_domains(const Decomposition& decomposition,
-                                                 std::span<const mesh::Hinge> hinges);
+/// Pairs of domains that share a mesh edge or face each other across a seam, each once, ascending.
+std::vector<std::array<int, 2>> adjacent_domains(
+    const Decomposition& decomposition, std::span<const mesh::Hinge> hinges,
+    std::span<const std::array<int, 2>> seam_neighbors = {});
 
 }  // namespace piecework::decomposition

@@ -11,6 +11,7 @@
 
 #include <piecework/core/types.hpp>
 #include <piecework/mesh/topology.hpp>
+#include <piecework/model/sewing.hpp>
 
 namespace piecework::model {
 
@@ -83,8 +84,11 @@ struct ClothModel {
   std::vector<double> triangle_mass;       ///< per triangle, rho A, kg
   Positions start;                         ///< |V| x 3, m; also orients degenerate triangles
   double mean_edge = 0;                    ///< mean rest edge length, m
+  Sewing sewing;                           ///< seams between and within parts; empty: none
 
   [[nodiscard]] int num_vertices() const { return static_cast<int>(mass.size()); }
+  /// Vertices that are no slaves of a seam.
+  [[nodiscard]] int num_free() const { return num_vertices() - sewing.map().num_slaves(); }
 };
 
 /// Builds the constraints of all parts.

@@ -30,7 +30,13 @@ Integrator::Integrator(const ClothModel& model, ExternalForces forces, std::vect
       minimizer_(std::move(minimizer)) {}
 
 void Integrator::prepare(const State& state) {
-  minimizer_->prepare(pins_.fixed_at((state.step + 1) * options_.h));
+  minimizer_->prepare(held_at((state.step + 1) * options_.h));
+}
+
+std::vector<char> Integrator::held_at(double time) const {
+  std::vector<char> fixed = pins_.fixed_at(time);
+  model_.sewing.mark_held(fixed);
+  return fixed;
 }
 
 State Integrator::initial_state(const std::vector<Vec3>& part_velocity) const {
@@ -41,6 +47,7 @@ State Integrator::initial_state(const std::vector<Vec3>& part_velocity) const {
     state.v.middleRows(model_.parts[p].first_vertex, model_.parts[p].num_vertices).rowwise() =
         part_velocity[p].transpose();
   pins_.place(0.0, state.x);
+  model_.sewing.follow(0.0, state.x);
   return state;
 }
 
@@ -56,7 +63,7 @@ StepReport Integrator::step(State& state) {
     const auto v = static_cast<Eigen::Index>(i);
     predicted_.row(v) = state.x.row(v) + h * (state.v.row(v) + h * acceleration_.row(v));
   });
-  const std::vector<char> fixed = pins_.fixed_at(end);
+  const std::vector<char> fixed = held_at(end);
   pins_.place(end, predicted_);
   if (!all_finite(predicted_))
     throw SimulationError(
@@ -64,6 +71,7 @@ StepReport Integrator::step(State& state) {
                     "check forces, velocities and h = {} s",
                     state.step + 1, h));
   x_ = predicted_;
+  model_.sewing.settle(end, model_.mass, fixed, x_);  // where the iterations then stay
   double misc = phase.lap();
 
   StepReport report = minimizer_->minimize({&predicted_, &fixed, &state.x}, x_);
@@ -74,6 +82,7 @@ StepReport Integrator::step(State& state) {
         fmt::format("step {}: the solver left the finite numbers (energy {} J); "
                     "use a smaller h or softer material",
                     state.step + 1, report.energy));
+  model_.sewing.follow(end, x_);  // to the last bit
   const double keep = options_.damping ? std::exp(-*options_.damping * h) : 1.0;
   parallel_for(rows, [&](std::size_t i) {
     const auto v = static_cast<Eigen::Index>(i);

@@ -20,6 +20,8 @@ struct IntegratorOptions {
 /// Advances a State step by step:
 ///     z = x_n + h v_n + h^2 M^-1 f_ext(x_n, v_n);  x_{n+1} = argmin E(x; z);
 ///     v_{n+1} = (x_{n+1} - x_n) / h                                         [Lu25, Eq. 1]
+/// With seams every vertex, slaves included, has its own z and mass, and every state satisfies
+/// x = T x_free + o(t) exactly.
 class Integrator {
  public:
   /// \param model  must outlive the integrator.
@@ -34,12 +36,16 @@ class Integrator {
   /// \throws SimulationError if the new state is not finite (the text says what to change).
   StepReport step(State& state);
 
-  /// The start of a simulation: start shape, pins placed, the velocity of each part.
+  /// The start of a simulation: start shape, pins placed, seams without close time closed, the
+  /// velocity of each part.
   [[nodiscard]] State initial_state(const std::vector<Vec3>& part_velocity) const;
 
   [[nodiscard]] const Minimizer& minimizer() const { return *minimizer_; }
 
  private:
+  /// Vertices that are held, slaves of held carriers included.
+  [[nodiscard]] std::vector<char> held_at(double time) const;
+
   const ClothModel& model_;
   ForceField forces_;
   PinScript pins_;

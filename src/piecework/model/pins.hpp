@@ -2,10 +2,13 @@
 
 // Vertices held or moved by a script. They are eliminated from the system while they are held.
 
+#include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <piecework/core/types.hpp>
+#include <piecework/mesh/seams.hpp>
 
 namespace piecework::model {
 
@@ -20,6 +23,20 @@ struct Pin {
   std::optional<double> stop;     ///< motion ends, s
   std::optional<double> release;  ///< from this time on the vertices are free, s
 };
+
+/// How messages call pins and vertices.
+struct PinNames {
+  std::function<std::string(std::size_t)> pin;
+  std::function<std::string(int)> vertex;
+};
+
+/// Pins on sewn vertices hold what carries them, each carrier at its own place, moved like the pin:
+/// the slave follows. Slaves leave the lists of vertices, their carriers join them.
+/// 	hrows InputError that names both pins if a carrier would thereby be held by two pins that
+/// move
+///         or end differently.
+std::vector<Pin> pins_on_carriers(std::vector<Pin> pins, const mesh::SeamMap& seams,
+                                  const PinNames& names);
 
 /// Evaluates pins; positions are functions of time and the start shape only.
 class PinScript {

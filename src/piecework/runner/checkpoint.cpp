@@ -51,6 +51,7 @@ std::string scene_hash(const scene::Scene& scene) {
     cloth.mesh.file = fs::path(cloth.mesh.file).filename().string();
     cloth.rest_file = fs::path(cloth.rest_file).filename().string();
   }
+  for (scene::Seam& seam : motion.seams) seam.file = fs::path(seam.file).filename().string();
   return Hash().add(scene::resolved_json(motion)).hex();
 }
 
@@ -66,6 +67,11 @@ std::string motion_hash(const World& world) {
     hash.add(std::span(&c.weight, 1)).add(std::span(&c.rest_length, 1));
   for (const model::Pin& pin : world.pins) hash.add(std::span(pin.vertices));
   for (const model::Load& load : world.forces.loads) hash.add(std::span(load.vertices));
+  if (!model.sewing.empty()) {
+    const mesh::SeamMap& seams = model.sewing.map();
+    hash.add(std::span(seams.slaves)).add(std::span(seams.begin)).add(std::span(seams.carrier));
+    hash.add(std::span(seams.weight)).add(std::span(seams.close_time));
+  }
   return hash.hex();
 }
 

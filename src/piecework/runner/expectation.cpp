@@ -33,7 +33,8 @@ Rows triangles_of(const World& world, int part) {
 
 Eigen::Index axis_of(const std::string& quantity) { return quantity.back() - 'x'; }
 
-/// Force of the pins on the cloth: what holds their vertices against elasticity and weight, N.
+/// Force of the pins on the cloth: what holds their vertices against elasticity and weight, N. What
+/// pulls at sewn vertices pulls at their carriers.
 Vec3 reaction(const World& world, const model::State& state, Rows rows) {
   const std::vector<char> held =
       model::PinScript(world.pins, world.model.start).fixed_at(state.time);
@@ -41,13 +42,29 @@ Vec3 reaction(const World& world, const model::State& state, Rows rows) {
   local::JacobiStep local(world.model, 1.0);
   Positions elastic;
   local.evaluate(state.x, {&state.x, &none, &state.x}, elastic);  // z = x: no inertia
+  if (world.forces.gravity) elastic -= world.model.mass * world.forces.gravity->transpose();
+  world.model.sewing.fold(elastic);
   Vec3 sum = Vec3::Zero();
-  for (int v = rows.first; v < rows.first + rows.count; ++v) {
-    if (!held[static_cast<std::size_t>(v)]) continue;
-    sum += elastic.row(v).transpose();
-    if (world.forces.gravity) sum -= world.model.mass[v] * *world.forces.gravity;
-  }
+  for (int v = rows.first; v < rows.first + rows.count; ++v)
+    if (held[static_cast<std::size_t>(v)]) sum += elastic.row(v).transpose();
   return sum;
+}
+
+double seam_gap(const World& world, const Positions& x, Rows rows) {
+  const model::Sewing& sewing = world.model.sewing;
+  double gap = 0;
+  for (int s = 0; s < sewing.map().num_slaves(); ++s) {
+    const int v = sewing.map().slaves[static_cast<std::size_t>(s)];
+    if (v >= rows.first && v < rows.first + rows.count) gap = std::max(gap, sewing.gap(x, s));
+  }
+  return gap;
+}
+
+double sewn_vertices(const World& world, Rows rows) {
+  const auto& slaves = world.model.sewing.map().slaves;
+  return static_cast<double>(std::count_if(slaves.begin(), slaves.end(), [&](int v) {
+    return v >= rows.first && v < rows.first + rows.count;
+  }));
 }
 
 double of_frames(const std::string& quantity, const std::vector<FrameRecord>& frames) {
@@ -149,6 +166,8 @@ double ExpectationChecker::measure(const Item& item, const model::State& state,
   if (quantity == "kinetic_energy") return 0.5 * mass.dot(v.rowwise().squaredNorm());
   if (quantity == "max_speed") return v.rowwise().norm().maxCoeff();
   if (quantity == "reaction_force_y") return reaction(world_, state, rows).y();
+  if (quantity == "seam_gap") return seam_gap(world_, state.x, rows);
+  if (quantity == "sewn_vertices") return sewn_vertices(world_, rows);
   if (quantity == "max_strain" || quantity == "mean_strain") {
     const std::vector<float> strain = model::triangle_strain(world_.model, state.x);
     const Rows triangles = triangles_of(world_, item.part);

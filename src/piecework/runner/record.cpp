@@ -92,17 +92,20 @@ Json domains_json(const World& world) {
 Json scene_json(const RunRecord& record, const World& world) {
   Json overrides = Json::object();
   for (const auto& [key, value] : record.overrides) overrides[key] = value;
-  return {{"name", world.scene.name},
-          {"motion_hash", record.motion_hash},
-          {"overrides", overrides},
-          {"vertices", world.model.num_vertices()},
-          {"dof", 3 * world.model.num_vertices()},
-          {"triangles", world.model.triangles.size()},
-          {"bending_hinges", world.model.bend.size()},
-          {"h_s", world.scene.step.h},
-          {"mean_edge_m", world.model.mean_edge},
-          {"domains", domains_json(world)},
-          {"resolved", Json::parse(scene::resolved_json(world.scene))}};
+  Json json = {{"name", world.scene.name},
+               {"motion_hash", record.motion_hash},
+               {"overrides", overrides},
+               {"vertices", world.model.num_vertices()},
+               {"dof", 3 * world.model.num_vertices()},
+               {"triangles", world.model.triangles.size()},
+               {"bending_hinges", world.model.bend.size()},
+               {"h_s", world.scene.step.h},
+               {"mean_edge_m", world.model.mean_edge},
+               {"domains", domains_json(world)}};
+  if (!world.model.sewing.empty())  // what is off has no key
+    json["sewn_vertices"] = world.model.sewing.map().num_slaves();
+  json["resolved"] = Json::parse(scene::resolved_json(world.scene));
+  return json;
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/generate.hpp>
 #include <piecework/mesh/import.hpp>
+#include <piecework/runner/sewing.hpp>
 
 namespace piecework::runner {
 namespace {
@@ -176,7 +177,12 @@ model::StopRule stop_rule(const std::string& name) {
 }  // namespace
 
 decomposition::Elements World::elements() const {
-  return {model.triangles, model.hinges, model.hinge_bends, model.num_vertices()};
+  return {.triangles = model.triangles,
+          .hinges = model.hinges,
+          .hinge_bends = model.hinge_bends,
+          .num_vertices = model.num_vertices(),
+          .seams = model.sewing.empty() ? nullptr : &model.sewing.map(),
+          .seam_neighbors = seam_neighbors};
 }
 
 int World::vertex(std::size_t part, int file_vertex, const std::string& where) const {
@@ -190,6 +196,16 @@ int World::vertex(std::size_t part, int file_vertex, const std::string& where) c
   if (v < 0)
     throw InputError(fmt::format("{}: no face uses vertex {}; name another", where, file_vertex));
   return model.parts[part].first_vertex + v;
+}
+
+std::string World::vertex_name(int vertex) const {
+  std::size_t p = 0;
+  while (vertex >= model.parts[p].first_vertex + model.parts[p].num_vertices) ++p;
+  const int v = vertex - model.parts[p].first_vertex;
+  const std::vector<int>& map = documents[p].vertex_map;
+  const auto in_file = std::find(map.begin(), map.end(), v) - map.begin();
+  return fmt::format("vertex {} of {}", map.empty() ? v : static_cast<int>(in_file),
+                     model.parts[p].name);
 }
 
 mesh::MeshDocument load_mesh(const scene::Mesh& mesh) {
@@ -219,9 +235,11 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
     parts.push_back(
         make_part(*world, scene.cloths[i], fmt::format("{}: /cloths/{}", scene.source, i)));
   world->model = model::build_model(parts);
+  sew(*world);
   add_fields(*world);
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     add_pins_and_loads(*world, i, fmt::format("{}: /cloths/{}", scene.source, i));
+  hold_seams(*world);
   world->load_ms = watch.lap();
 
   world->domains = decomposition::decompose(world->elements(), {.domains = scene.solver.domains});

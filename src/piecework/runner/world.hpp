@@ -2,6 +2,7 @@
 
 // A scene made real: meshes loaded and placed, constraints built, domains cut.
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,7 +22,8 @@ struct World {
   scene::Scene scene;
   std::vector<mesh::MeshDocument> documents;  ///< per cloth, placed; in the order of model.parts
   model::ClothModel model;
-  std::vector<model::Pin> pins;
+  std::vector<model::Pin> pins;                    ///< of sewn vertices: on what carries them
+  std::vector<std::array<int, 2>> seam_neighbors;  ///< triangles that face each other across seams
   model::ExternalForces forces;
   std::vector<Vec3> part_velocity;  ///< m/s, per cloth
   decomposition::Decomposition domains;
@@ -39,6 +41,8 @@ struct World {
   /// Vertex of the model for a vertex of cloth `part` in the order of its file.
   /// \throws InputError if it is out of range or used by no face.
   [[nodiscard]] int vertex(std::size_t part, int file_vertex, const std::string& where) const;
+  /// "vertex 12 of skirt" for a vertex of the model: its number in the cloth's file.
+  [[nodiscard]] std::string vertex_name(int vertex) const;
 };
 
 /// Loads meshes, places cloths, resolves regions, builds constraints and domains.

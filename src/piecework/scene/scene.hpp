@@ -112,6 +112,22 @@ struct Cloth {
   bool operator==(const Cloth&) const = default;
 };
 
+/// Vertices of one cloth sewn to another cloth, or to itself.
+struct Seam {
+  std::string name;
+  std::string cloth;                            ///< empty: the only one
+  std::string to;                               ///< empty: `cloth`
+  std::vector<std::array<double, 4>> stitches;  ///< vertex, a, b, ratio
+  std::vector<int> chain, to_chain;
+  std::string set, to_set;
+  bool reversed = false;
+  std::string file;                  ///< relative to the scene's folder
+  std::optional<double> distance;    ///< m
+  std::optional<double> close_time;  ///< s; absent: closed from the start
+
+  bool operator==(const Seam&) const = default;
+};
+
 struct Solver {
   std::string method = "vanilla_pd";
   std::string global = "single";
@@ -176,6 +192,7 @@ struct Scene {
   Quality quality;
   std::map<std::string, Material> materials;
   std::vector<Cloth> cloths;
+  std::vector<Seam> seams;
   Camera camera;
   Render render;
   std::vector<Expectation> expect;

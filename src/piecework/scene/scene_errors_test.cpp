@@ -158,10 +158,10 @@ TEST(SceneErrors, Keys) {
           {with(R"(@"friction": 0.4)"),
            "/friction: unknown key \"friction\"; known keys here: name, description, step, "
            "gravity, "
-           "wind, damping, solver, quality, materials, cloths, camera, render, expect"},
+           "wind, damping, solver, quality, materials, cloths, seams, camera, render, expect"},
           {with(R"(@"a/b~c": 0.4)"),
            "/a~1b~0c: unknown key \"a/b~c\"; known keys here: name, description, step, gravity, "
-           "wind, damping, solver, quality, materials, cloths, camera, render, expect"},
+           "wind, damping, solver, quality, materials, cloths, seams, camera, render, expect"},
           {R"(@{ "cloths": [] })",
            "/: \"materials\" is missing; add it: materials by name; cloths share them"},
           {with_cloth(R"(@{ "mesh": { "generator": "sheet" } })"),

@@ -283,6 +283,55 @@ void fields(V& v, Cloth& c) {
 }
 
 template <class V>
+void fields(V& v, Seam& s) {
+  v.about("Seam",
+          "Sewing. A vertex that is sewn onto an edge, onto any of its points, follows it exactly: "
+          "seams need not conform, and cost no stiffness. They have no bending stiffness either. "
+          "The side with more vertices follows (the second, `to`, if equal). Vertices that "
+          "coincide become one; a vertex may be sewn onto one edge only. A pin on a sewn vertex "
+          "holds the vertices that it follows.");
+  v.value({"name", "for messages"}, s.name, not_empty());
+  v.value({"cloth", "name of the cloth that is sewn; absent: the only one"}, s.cloth, not_empty());
+  v.value({"to", "name of the cloth that it is sewn to; absent: itself"}, s.to, not_empty());
+  v.value({"stitches",
+           "list of [vertex, a, b, r], vertex of cloth, a and b of to, numbers from 0 in the order "
+           "of the mesh's file: x_vertex = (1 - r) x_a + r x_b with r from 0 to 1"},
+          s.stitches, indices());
+  v.value({"chain",
+           "vertices of cloth along a border, in order, each joined to the next by an edge; a "
+           "closed chain ends with its first"},
+          s.chain, indices());
+  v.value(Key{"to_chain",
+              "vertices of to, first to first and last to last, by fraction of the length at rest: "
+              "the longer side is gathered"}
+              .only(!s.chain.empty(), "chain"),
+          s.to_chain, indices());
+  v.value({"set",
+           "name of a vertex set of cloth that runs along a border; it starts at the end with the "
+           "lower number"},
+          s.set, not_empty());
+  v.value(Key{"to_set", "the same for to"}.only(!s.set.empty(), "set"), s.to_set, not_empty());
+  v.value(Key{"reversed", "the first vertex of set meets the last one of to_set"}.only(
+              !s.set.empty(), "set"),
+          s.reversed);
+  v.value({"file",
+           "JSON file with chains (seams: a.verts, b.verts) or stitches (seam_stitches: lists of "
+           "[vertex, a, b, r]) of cloth's mesh; a relative name starts at the folder of the scene"},
+          s.file, not_empty());
+  v.value({"distance",
+           "border vertices within this distance of a border edge of to, in the start shape, are "
+           "sewn onto it, unless they are already; at most an edge length",
+           "m"},
+          s.distance, above(0, 1e6));
+  v.exactly_one({"stitches", "chain", "set", "file", "distance"});
+  v.value({"close_time",
+           "time in which an open seam closes; absent: it is closed from the start, and may be "
+           "open by half a mean edge length there",
+           "s"},
+          s.close_time, above(0, 1e9));
+}
+
+template <class V>
 void fields(V& v, Solver& s) {
   v.about("Solver",
           "How a step is solved; changes the speed, not the result "
@@ -381,6 +430,8 @@ inline const Choices& quantities() {
       {"momentum_y", "linear momentum, y, kg m/s"},
       {"momentum_z", "linear momentum, z, kg m/s"},
       {"reaction_force_y", "total force of the pins on the cloth, y, N"},
+      {"seam_gap", "largest distance of a sewn vertex from its place on the seam, m"},
+      {"sewn_vertices", "vertices that follow others because of a seam"},
       {"gradient",
        "largest over the steps so far: rms nodal force residual "
        "over free vertices / "
@@ -424,6 +475,7 @@ void fields(V& v, Scene& s) {
   v.object({"quality", "how accurately a step is solved"}, s.quality);
   v.map(Key{"materials", "materials by name; cloths share them"}.needed(), s.materials);
   v.list(Key{"cloths", "pieces of cloth, at least one"}.needed(), s.cloths);
+  v.list({"seams", "what is sewn together"}, s.seams);
   v.object({"camera", "point of view"}, s.camera);
   v.object({"render", "what the pictures show"}, s.render);
   v.list({"expect",

@@ -79,6 +79,7 @@ Scene load_scene(const fs::path& path, const std::vector<Override>& overrides) {
     resolve(cloth.mesh.file, folder);
     resolve(cloth.rest_file, folder);
   }
+  for (Seam& seam : scene.seams) resolve(seam.file, folder);
   return scene;
 }
 

@@ -48,6 +48,12 @@ constexpr const char* kEveryKey = R"({
     { "name": "two",
       "mesh": { "file": "m.obj", "units": 0.01, "up_axis": "z", "repair": true, "weld": false },
       "material": "soft", "rest": "file", "rest_file": "r.obj" } ],
+  "seams": [
+    { "name": "hem", "cloth": "one", "to": "two", "stitches": [[1, 2, 3, 0.25], [4, 5, 6, 1]] },
+    { "cloth": "one", "chain": [1, 2, 3], "to_chain": [9, 8], "close_time": 0.5 },
+    { "cloth": "two", "to": "one", "set": "left", "to_set": "right", "reversed": true },
+    { "cloth": "two", "file": "two.seams.json" },
+    { "cloth": "two", "distance": 0.01 } ],
   "camera": { "position": [1, 2, 3], "target": [0, 1, 0], "fov": 40, "azimuth": 10, "elevation": 5,
               "ground": -1 },
   "render": { "color": "strain", "size": [320, 200], "borders": false, "mesh_lines": true },
@@ -88,6 +94,19 @@ Cloth expected_second_cloth() {
   return cloth;
 }
 
+std::vector<Seam> expected_seams() {
+  std::vector<Seam> seams(5);
+  seams[0].name = "hem", seams[0].cloth = "one", seams[0].to = "two";
+  seams[0].stitches = {{1, 2, 3, 0.25}, {4, 5, 6, 1}};
+  seams[1].cloth = "one", seams[1].chain = {1, 2, 3}, seams[1].to_chain = {9, 8};
+  seams[1].close_time = 0.5;
+  seams[2].cloth = "two", seams[2].to = "one", seams[2].set = "left", seams[2].to_set = "right";
+  seams[2].reversed = true;
+  seams[3].cloth = "two", seams[3].file = "two.seams.json";
+  seams[4].cloth = "two", seams[4].distance = 0.01;
+  return seams;
+}
+
 Scene expected_every_key() {
   Scene scene;
   scene.name = "all", scene.description = "every key\nof a scene", scene.source = "x/s.json";
@@ -98,6 +117,7 @@ Scene expected_every_key() {
   scene.solver = {"vanilla_pd", "single", "jacobi", 5, 3};
   scene.quality = {"dx_rms", 1e-3, 11, 2};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
+  scene.seams = expected_seams();
   scene.cloths = {expected_first_cloth(), expected_second_cloth()};
   scene.camera = {Vector{1, 2, 3}, Vector{0, 1, 0}, 40, 10, 5, -1};
   scene.render = {"strain", {320, 200}, false, true};
@@ -240,7 +260,8 @@ TEST_F(SceneFiles, ShippedScenesLoadByNameAndReadBack) {
     EXPECT_GE(scene.expect.size(), 3U);
     EXPECT_EQ(parse_scene(resolved_json(scene), scene.source), scene);
   }
-  for (const char* name : {"hanging_tablecloth", "flag_in_wind", "trampoline", "two_sheets"})
+  for (const char* name :
+       {"hanging_tablecloth", "flag_in_wind", "sewn_bag", "trampoline", "two_sheets"})
     EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
 }
 

@@ -1,6 +1,7 @@
 #include <piecework/scene/scene_rules.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include <fmt/format.h>
@@ -86,6 +87,40 @@ void check_cloths(const Scene& scene, const Part& part) {
   }
 }
 
+void check_stitches(const Seam& seam, const Part& part) {
+  for (std::size_t i = 0; i < seam.stitches.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k)
+      part.in(i).in(k).require(seam.stitches[i][k] == std::floor(seam.stitches[i][k]),
+                               fmt::format("{} is no vertex number", seam.stitches[i][k]),
+                               "write [vertex, a, b, ratio]");
+    part.in(i).in(3).require(seam.stitches[i][3] <= 1,
+                             fmt::format("the ratio {} is above 1", seam.stitches[i][3]),
+                             "choose one of 0 (at a) to 1 (at b)");
+  }
+}
+
+void check_seam(const Seam& seam, const Scene& scene, const Part& part) {
+  std::vector<std::string> names;
+  for (const Cloth& cloth : scene.cloths) names.push_back(cloth.name);
+  const auto check_name = [&](const char* key, const std::string& name) {
+    part.in(key).require(name.empty() || std::find(names.begin(), names.end(), name) != names.end(),
+                         fmt::format("no cloth is named \"{}\"", printable(name)),
+                         suggestion(name, names, "cloths"));
+  };
+  check_name("cloth", seam.cloth);
+  check_name("to", seam.to);
+  part.require(!seam.cloth.empty() || names.size() == 1,
+               fmt::format("the seam does not say which of the {} cloths is sewn", names.size()),
+               "add \"cloth\", the name of one");
+  part.require(seam.file.empty() || seam.to.empty(), "a file sews a cloth to itself",
+               "remove \"to\"");
+  part.require(seam.chain.empty() || !seam.to_chain.empty(), "\"chain\" without a \"to_chain\"",
+               "add the vertices that it is sewn to");
+  part.require(seam.set.empty() || !seam.to_set.empty(), "\"set\" without a \"to_set\"",
+               "add the vertex set that it is sewn to");
+  check_stitches(seam, part.in("stitches"));
+}
+
 void check_expectation(const Expectation& expected, const Scene& scene, const Part& part) {
   check_order(part.in("max"), expected.min, expected.max, "min", "max");
   std::vector<std::string> names;
@@ -135,6 +170,8 @@ void check_rules(const Scene& scene, const Document& document) {
   root.in("camera").in("target").require(
       !scene.camera.position || scene.camera.position != scene.camera.target,
       "the camera looks at its own position", "move \"target\" or \"position\"");
+  for (std::size_t i = 0; i < scene.seams.size(); ++i)
+    check_seam(scene.seams[i], scene, root.in("seams").in(i));
   for (std::size_t i = 0; i < scene.expect.size(); ++i)
     check_expectation(scene.expect[i], scene, root.in("expect").in(i));
 }

@@ -279,6 +279,10 @@ TEST(SceneSchema, DefaultsOfClothsAreThoseOfTheStructs) {
   EXPECT_EQ(default_of("cloths.[].pins.[].stop"), "none");
   EXPECT_EQ(default_of("cloths.[].loads.[].force"), "none");
   EXPECT_EQ(default_of("cloths.[].loads.[].start"), Load{}.start);
+  EXPECT_EQ(default_of("seams.[].reversed"), Seam{}.reversed);
+  EXPECT_EQ(default_of("seams.[].cloth"), "none");
+  EXPECT_EQ(default_of("seams.[].distance"), "none");
+  EXPECT_EQ(default_of("seams.[].close_time"), "none");
 }
 
 }  // namespace
