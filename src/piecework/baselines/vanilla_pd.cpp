@@ -30,25 +30,26 @@ double VanillaPd::ErrorEstimate::value() const {
 }
 
 VanillaPd::VanillaPd(const model::ClothModel& model, double h, double gravity,
-                     model::StopOptions stop)
+                     model::StopOptions stop, std::unique_ptr<global::ExactSolver> solver)
     : model_(model),
       stop_(stop),
       gravity_(gravity),
       unit_box_((model.start.colwise().maxCoeff() - model.start.colwise().minCoeff()).maxCoeff()),
       K_(assemble_system(model, h)),
+      solver_(std::move(solver)),
       local_(model, h) {
   if (!(unit_box_ > 0)) unit_box_ = 1.0;  // a cloth that starts as a point
 }
 
 std::string VanillaPd::description() const {
-  return "vanilla PD, Jacobi local step, " + global::CholmodSolver::description();
+  return "vanilla PD, Jacobi local step, " + solver_->description();
 }
 
 void VanillaPd::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;
   reduction_ = model::Reduction(model_, fixed);
   increment_.resize(reduction_.count(), 3);
-  const auto status = solver_.factor(reduction_.system(K_));
+  const auto status = solver_->factor(reduction_.system(K_), reduction_.vertices());
   if (status == global::SolveStatus::OutOfMemory)
     throw SimulationError(
         fmt::format("the factor of {} unknowns does not fit into memory", reduction_.count()));
@@ -59,7 +60,7 @@ void VanillaPd::prepare(const std::vector<char>& fixed) {
 }
 
 model::SetupReport VanillaPd::setup_report() const {
-  const global::FactorReport& report = solver_.report();
+  const global::FactorReport& report = solver_->report();
   return {report.analyze_ms + report.factor_ms, report.nonzeros, static_cast<double>(report.bytes)};
 }
 
@@ -104,7 +105,7 @@ void VanillaPd::global_step(Positions& x, StepReport& report) {
     const auto row = static_cast<Eigen::Index>(i);
     increment_.row(row) = -reduction_.row(gradient_, static_cast<int>(i));
   });
-  if (solver_.solve(increment_) != global::SolveStatus::Ok)
+  if (solver_->solve(increment_) != global::SolveStatus::Ok)
     throw SimulationError("the global solve failed (out of memory)");
   reduction_.advance(increment_, x);
   const auto row_sq = [&](std::size_t i) {

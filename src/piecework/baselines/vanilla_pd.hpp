@@ -1,9 +1,11 @@
 #pragma once
 
-// Vanilla projective dynamics [Bouaziz et al. 2014]: Jacobi local step, undivided prefactored
-// global step. The baseline kept for ever; it shares nothing of the solver it is compared with.
+// Vanilla projective dynamics [Bouaziz et al. 2014]: Jacobi local step, prefactored global step.
+// With the undivided factor it is the baseline kept for ever; any other exact solver takes the same
+// steps.
 
 #include <deque>
+#include <memory>
 
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/local/jacobi.hpp>
@@ -19,7 +21,9 @@ class VanillaPd final : public model::Minimizer {
   /// \param model    must outlive this object
   /// \param h        time step, s
   /// \param gravity  magnitude that turns forces into weights for `gradient`, m/s^2
-  VanillaPd(const model::ClothModel& model, double h, double gravity, model::StopOptions stop);
+  /// \param solver   of the global step
+  VanillaPd(const model::ClothModel& model, double h, double gravity, model::StopOptions stop,
+            std::unique_ptr<global::ExactSolver> solver = global::make_cholmod_solver());
 
   void prepare(const std::vector<char>& fixed) override;
   [[nodiscard]] model::SetupReport setup_report() const override;
@@ -50,7 +54,7 @@ class VanillaPd final : public model::Minimizer {
   SparseMatrix K_;
   std::vector<char> fixed_;
   model::Reduction reduction_;
-  global::CholmodSolver solver_;
+  std::unique_ptr<global::ExactSolver> solver_;
   local::JacobiStep local_;
   Positions gradient_;
   global::RightHandSides increment_;

@@ -160,4 +160,25 @@ std::string CholmodSolver::description() {
                      version[1], version[2]);
 }
 
+namespace {
+
+class CholmodExactSolver final : public ExactSolver {
+ public:
+  SolveStatus factor(const SparseMatrix& K, std::span<const int> /*row_vertex*/) override {
+    return solver_.factor(K);
+  }
+  SolveStatus solve(RightHandSides& b) override { return solver_.solve(b); }
+  [[nodiscard]] const FactorReport& report() const override { return solver_.report(); }
+  [[nodiscard]] std::string description() const override { return CholmodSolver::description(); }
+
+ private:
+  CholmodSolver solver_;
+};
+
+}  // namespace
+
+std::unique_ptr<ExactSolver> make_cholmod_solver() {
+  return std::make_unique<CholmodExactSolver>();
+}
+
 }  // namespace piecework::global

@@ -7,12 +7,10 @@
 #include <string>
 
 #include <piecework/core/types.hpp>
+#include <piecework/global/exact_solver.hpp>
 #include <piecework/global/status.hpp>
 
 namespace piecework::global {
-
-/// |V| x 3, column-major: the three right-hand sides one after the other, as BLAS wants them.
-using RightHandSides = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor>;
 
 /// K x = b with K |V| x |V| symmetric positive definite (N/m), b and x |V| x 3 (N, m).
 /// One BLAS thread. Not thread-safe; one object per thread.
@@ -45,5 +43,8 @@ class CholmodSolver {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// CholmodSolver behind the common face; domains play no part.
+std::unique_ptr<ExactSolver> make_cholmod_solver();
 
 }  // namespace piecework::global

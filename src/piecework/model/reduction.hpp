@@ -29,6 +29,8 @@ class Reduction {
   [[nodiscard]] int count() const { return free_.count(); }
   /// Vertex of unknown i, ascending in i.
   [[nodiscard]] int vertex(int i) const { return free_.vertex[static_cast<std::size_t>(i)]; }
+  /// The same for all unknowns.
+  [[nodiscard]] const std::vector<int>& vertices() const { return free_.vertex; }
   /// Unknown of a vertex, -1 if it has none.
   [[nodiscard]] int number(int vertex) const {
     return free_.number[static_cast<std::size_t>(vertex)];

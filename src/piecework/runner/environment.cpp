@@ -95,7 +95,7 @@ Environment describe_environment() {
        fmt::format("{}{}", build_info::kRevision, build_info::kDirty ? " (modified)" : "")},
       {"eigen", fmt::format("Eigen {}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
                             EIGEN_MINOR_VERSION)},
-      {"global_solver", global::CholmodSolver::description()},
+      {"cholmod", global::CholmodSolver::description()},
       {"partitioner",
        fmt::format("{}, seed {}", decomposition::library_version(), decomposition::kDefaultSeed)},
       {"tasks", fmt::format("oneTBB {}", TBB_runtime_version())},

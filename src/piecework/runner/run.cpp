@@ -103,9 +103,9 @@ class Run {
     record_.threads = threads;
     prepare_directory();
     integrator_ = make_integrator(*world_);
-    record_.method = integrator_->minimizer().description();
     load_or_start();
     integrator_->prepare(state_);
+    record_.method = integrator_->minimizer().description();
     record_.setup = integrator_->minimizer().setup_report();
     observer_.started(*world_, frame_, frames_);
     if (frame_ == 0) {

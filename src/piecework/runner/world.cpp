@@ -249,6 +249,23 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
   return world;
 }
 
+namespace {
+
+std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
+  if (world.scene.solver.global == "single") return global::make_cholmod_solver();
+  global::VertexTree domains;
+  if (world.domains.num_domains > 1) {
+    for (const auto& node : world.domains.nodes) domains.node_parent.push_back(node.parent);
+    domains.vertex_node = world.domains.vertex_node;
+  }
+  return global::make_tree_solver(
+      std::move(domains),
+      {.precision = world.scene.quality.precision == "single" ? global::Precision::Single
+                                                              : global::Precision::Double});
+}
+
+}  // namespace
+
 std::unique_ptr<model::Integrator> make_integrator(const World& world) {
   const scene::Scene& scene = world.scene;
   constexpr double kStandardGravity = 9.81;  // m/s^2: turns forces into weights where there is none
@@ -257,8 +274,9 @@ std::unique_ptr<model::Integrator> make_integrator(const World& world) {
                                 .tolerance = scene.quality.tolerance,
                                 .max_iterations = scene.quality.max_iterations,
                                 .min_iterations = scene.quality.min_iterations};
-  auto minimizer = std::make_unique<baselines::VanillaPd>(
-      world.model, scene.step.h, gravity > 0 ? gravity : kStandardGravity, stop);
+  auto minimizer = std::make_unique<baselines::VanillaPd>(world.model, scene.step.h,
+                                                          gravity > 0 ? gravity : kStandardGravity,
+                                                          stop, make_exact_solver(world));
   return std::make_unique<model::Integrator>(
       world.model, world.forces, world.pins,
       model::IntegratorOptions{.h = scene.step.h, .damping = scene.damping}, std::move(minimizer));

@@ -130,7 +130,7 @@ struct Seam {
 
 struct Solver {
   std::string method = "vanilla_pd";
-  std::string global = "single";
+  std::string global = "tree";
   std::string local = "jacobi";
   int domains = 32;
   int threads = 0;  ///< 0: what the machine allows
@@ -145,6 +145,7 @@ struct Quality {
   double tolerance = 1e-2;  ///< unit depends on stop; see the reference
   int max_iterations = 200;
   int min_iterations = 1;
+  std::string precision = "double";  ///< "double" | "single"
 
   bool operator==(const Quality&) const = default;
 };

@@ -293,8 +293,8 @@ TEST(SceneErrors, ChoicesAndReferences) {
            {with(R"("quality": { "stop": @"never" })"),
             "/quality/stop: unknown value \"never\"; known values: error, gradient, dx_2, dx_rms, "
             "dx_inf, iterations"},
-           {with(R"("solver": { "global": @"tree" })"),
-            "/solver/global: unknown value \"tree\"; known values: single"},
+           {with(R"("solver": { "global": @"trees" })"),
+            "/solver/global: unknown value \"trees\"; did you mean \"tree\"?"},
            {with(R"("expect": [ { "quantity": @"lowestY", "min": 0 } ])"),
             "/expect/0/quantity: unknown value \"lowestY\"; did you mean \"lowest_y\"?"},
            {with_cloth(R"({ "mesh": { "generator": "sheet" }, "material": @"coton" })"),
