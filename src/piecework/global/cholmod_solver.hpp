@@ -50,6 +50,14 @@ class CholmodSolver {
   /// Overwrites b with K^-1 b. \pre b has K's number of rows.
   [[nodiscard]] SolveStatus solve(RightHandSides& b);
 
+  /// The same for any number of columns, in new memory; for set-up, not for the time step.
+  [[nodiscard]] SolveStatus solve_many(Eigen::MatrixXd& b) const;
+
+  /// Smallest pivot relative to its diagonal entry, min_i L_ii^2 / K_ii: a few units of rounding if
+  /// K is singular, whatever its scales are. 0 without a factor, 1 for n = 0.
+  /// \pre K is the matrix of the last factorisation.
+  [[nodiscard]] double smallest_pivot(const SparseMatrix& K) const;
+
   [[nodiscard]] const FactorReport& report() const;
 
   /// "CHOLMOD 3.0.14 supernodal, METIS, OpenBLAS 1 thread".
