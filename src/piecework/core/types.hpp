@@ -24,6 +24,13 @@ using Positions = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 /// Symmetric system matrix, both triangles stored, column-major, 32-bit indices.
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
+/// One domain's share of a system matrix: the sum over the domains, each entry K(a, b) added at
+/// (rows[a], rows[b]), is the matrix of the whole.
+struct DomainMatrix {
+  std::vector<int> rows;  ///< rows of the whole, ascending
+  SparseMatrix K;         ///< rows.size() x rows.size(), symmetric, both triangles stored
+};
+
 /// Vertex indices of one triangle, counter-clockwise seen from the front.
 using Triangle = std::array<int, 3>;
 using Triangles = std::vector<Triangle>;

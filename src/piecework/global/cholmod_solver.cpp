@@ -1,5 +1,7 @@
 #include <piecework/global/cholmod_solver.hpp>
 
+#include <algorithm>
+
 #include <cholmod.h>
 
 #include <algorithm>
@@ -149,6 +151,46 @@ SolveStatus CholmodSolver::solve(double* b, int columns) {
     return to_status(impl_->common.status);
   std::copy_n(static_cast<const double*>(impl_->x->x), rows * count, b);
   return SolveStatus::Ok;
+}
+
+SolveStatus CholmodSolver::solve_many(Eigen::MatrixXd& b) const {
+  if (!impl_->factored) return SolveStatus::NotFactored;
+  PIECEWORK_ASSERT(b.rows() == impl_->rows);
+  if (b.size() == 0) return SolveStatus::Ok;
+  cholmod_dense rhs{};
+  rhs.nrow = static_cast<std::size_t>(b.rows());
+  rhs.ncol = static_cast<std::size_t>(b.cols());
+  rhs.nzmax = rhs.nrow * rhs.ncol;
+  rhs.d = rhs.nrow;
+  rhs.x = b.data();
+  rhs.xtype = CHOLMOD_REAL;
+  rhs.dtype = CHOLMOD_DOUBLE;
+  cholmod_dense* x = cholmod_solve(CHOLMOD_A, impl_->factor, &rhs, &impl_->common);
+  if (!x) return to_status(impl_->common.status);
+  b = Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(x->x), b.rows(), b.cols());
+  cholmod_free_dense(&x, &impl_->common);
+  return SolveStatus::Ok;
+}
+
+double CholmodSolver::smallest_pivot(const SparseMatrix& K) const {
+  if (!impl_->factored) return 0;
+  if (impl_->rows == 0) return 1;
+  const cholmod_factor& L = *impl_->factor;
+  const Eigen::VectorXd diagonal = K.diagonal();
+  const auto* columns = static_cast<const int*>(L.super);
+  const auto* rows = static_cast<const int*>(L.pi);
+  const auto* values = static_cast<const int*>(L.px);
+  const auto* order = static_cast<const int*>(L.Perm);
+  const auto* x = static_cast<const double*>(L.x);
+  double smallest = 1;
+  for (std::size_t s = 0; s < L.nsuper; ++s) {
+    const Eigen::Index height = rows[s + 1] - rows[s];  // a supernode is a dense column-major panel
+    for (int column = columns[s]; column < columns[s + 1]; ++column) {
+      const double pivot = x[values[s] + (column - columns[s]) * (height + 1)];
+      smallest = std::min(smallest, pivot * pivot / diagonal[order[column]]);
+    }
+  }
+  return smallest;
 }
 
 const FactorReport& CholmodSolver::report() const { return impl_->report; }

@@ -34,6 +34,14 @@ class CholmodSolver {
   /// The same for |V| x columns numbers in column-major order.
   [[nodiscard]] SolveStatus solve(double* b, int columns);
 
+  /// The same for any number of columns, in new memory; for set-up, not for the time step.
+  [[nodiscard]] SolveStatus solve_many(Eigen::MatrixXd& b) const;
+
+  /// Smallest pivot relative to its diagonal entry, min_i L_ii^2 / K_ii: a few units of rounding if
+  /// K is singular, whatever its scales are. 0 without a factor, 1 for n = 0.
+  /// \pre K is the matrix of the last factorisation.
+  [[nodiscard]] double smallest_pivot(const SparseMatrix& K) const;
+
   [[nodiscard]] const FactorReport& report() const;
 
   /// "CHOLMOD 3.0.14 supernodal, METIS, OpenBLAS 1 thread".

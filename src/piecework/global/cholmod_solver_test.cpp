@@ -30,6 +30,18 @@ TEST(CholmodSolver, MatchesADenseSolve) {
   EXPECT_GT(solver.report().flops, 0);
 }
 
+TEST(CholmodSolver, SolvesManyColumns) {
+  const SparseMatrix K = cloth_matrix(8);
+  CholmodSolver solver;
+  Eigen::MatrixXd b = Eigen::MatrixXd::Identity(64, 17);
+  EXPECT_EQ(solver.solve_many(b), SolveStatus::NotFactored);
+  ASSERT_EQ(solver.factor(K), SolveStatus::Ok);
+  ASSERT_EQ(solver.solve_many(b), SolveStatus::Ok);
+  EXPECT_LT((K * b - Eigen::MatrixXd::Identity(64, 17)).norm(), 1e-10);
+  Eigen::MatrixXd none(64, 0);
+  EXPECT_EQ(solver.solve_many(none), SolveStatus::Ok);
+}
+
 TEST(CholmodSolver, RefactorsNewValuesOnTheSamePattern) {
   CholmodSolver solver;
   ASSERT_EQ(solver.factor(cloth_matrix(10)), SolveStatus::Ok);
@@ -51,6 +63,23 @@ TEST(CholmodSolver, IndefiniteMatrixIsAStatusAndDropsTheFactor) {
   RightHandSides b = RightHandSides::Constant(36, 3, 42);
   EXPECT_EQ(solver.solve(b), SolveStatus::NotFactored);
   EXPECT_TRUE(b == RightHandSides::Constant(36, 3, 42));
+}
+
+TEST(CholmodSolver, SmallestPivotFromTheLastOneOfADenseFactor) {
+  const SparseMatrix K = cloth_matrix(6);
+  CholmodSolver solver;
+  EXPECT_EQ(solver.smallest_pivot(K), 0);
+  ASSERT_EQ(solver.factor(K), SolveStatus::Ok);
+  // Bounds that hold for every order: 1 / (K_ii (K^-1)_ii) is row i's pivot when it comes last.
+  const Eigen::MatrixXd inverse = Eigen::MatrixXd(K).inverse();
+  double last = 1;
+  for (int i = 0; i < 36; ++i) last = std::min(last, 1 / (K.coeff(i, i) * inverse(i, i)));
+  EXPECT_GE(solver.smallest_pivot(K), 0.999 * last);
+  EXPECT_LT(solver.smallest_pivot(K), 1);
+  SparseMatrix singular = cloth_matrix(6);
+  for (int i = 0; i < 36; ++i) singular.coeffRef(i, i) -= singular.row(i).sum();
+  EXPECT_TRUE(solver.refactor(singular) != SolveStatus::Ok ||
+              solver.smallest_pivot(singular) < 1e-14);
 }
 
 TEST(CholmodSolver, NanIsNotPositiveDefinite) {

@@ -321,6 +321,9 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
       const auto pivot = static_cast<double>(*matrix.at(c, c));
       scratch.outcome.min_pivot = std::min(scratch.outcome.min_pivot, pivot);
       scratch.outcome.max_pivot = std::max(scratch.outcome.max_pivot, pivot);
+      scratch.outcome.smallest_pivot =
+          std::min(scratch.outcome.smallest_pivot,
+                   pivot * pivot / input_.diagonal[static_cast<std::size_t>(front(f).first + c)]);
     }
     if (!small) update_trailing(matrix, panel.first, end, tiled);
     store_panel(p, matrix, diagonal, scratch);
@@ -410,6 +413,7 @@ void Factorizer<T, N>::note(const FactorOutcome& part, FactorOutcome& whole) con
   if (part.status != SolveStatus::Ok) whole.status = part.status;
   whole.min_pivot = std::min(whole.min_pivot, part.min_pivot);
   whole.max_pivot = std::max(whole.max_pivot, part.max_pivot);
+  whole.smallest_pivot = std::min(whole.smallest_pivot, part.smallest_pivot);
   whole.max_condition = std::max(whole.max_condition, part.max_condition);
   whole.substituted_panels += part.substituted_panels;
 }

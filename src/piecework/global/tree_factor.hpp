@@ -33,6 +33,7 @@ FrontEntries scatter_entries(const SymmetricPattern& pattern, const Symbolic& sy
 struct FactorOutcome {
   SolveStatus status = SolveStatus::Ok;
   double min_pivot = 0, max_pivot = 0;  ///< of L's diagonal
+  double smallest_pivot = 1;            ///< relative: smallest L_ii^2 / K_ii
   int substituted_panels = 0;           ///< ill-conditioned: kept as L instead of an inverse
   /// Largest condition of an inverted pivot block D, estimated as the largest entry on D's diagonal
   /// times the 1-norm of D^-1.
@@ -54,9 +55,10 @@ struct NumericInput {
   const TreePlan* plan;
   const FrontEntries* entries;
   std::span<const double> values;
-  PanelLayout layout;      ///< of the kernels that will read the panels
-  Isa isa;                 ///< for the dense kernels
-  double condition_limit;  ///< pivot blocks above are not inverted
+  std::span<const double> diagonal;  ///< K_ii in order of elimination
+  PanelLayout layout;                ///< of the kernels that will read the panels
+  Isa isa;                           ///< for the dense kernels
+  double condition_limit;            ///< pivot blocks above are not inverted
 };
 
 /// Factors. On failure the factor's contents are void. Parallel over subtrees, then over the fronts

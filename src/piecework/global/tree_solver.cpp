@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <new>
 #include <variant>
 
@@ -36,6 +37,10 @@ void check_pattern(const SymmetricPattern& pattern) {
             fmt::format("matrix pattern: column {} has row {}; there are {} rows", c, row, n));
   }
 }
+
+/// Pivots below so many roundings (times the root of the number of rows) of their diagonal entry
+/// are those of a singular matrix. Chosen.
+constexpr double kPivotRounding = 10;
 
 /// Random errors by which the contraction of a 32-bit solve is estimated.
 constexpr int kProbes = 3;
@@ -108,10 +113,18 @@ struct TreeSolver::Impl {
 
   template <class T, class N>
   SolveStatus factor_with(std::span<const double> values) {
-    NumericInput input{
-        &symbolic, &engine<T>().plan, &entries, values, engine<T>().kernel_table.layout,
-        isa,       condition_limit()};
-    const FactorOutcome outcome = factor_tree<T, N>(input, engine<T>().factor);
+    for (std::size_t k = 0; k < diagonal_entry.size(); ++k)
+      diagonal[k] =
+          diagonal_entry[k] < 0 ? 0.0 : values[static_cast<std::size_t>(diagonal_entry[k])];
+    const NumericInput input{&symbolic, &engine<T>().plan, &entries,
+                             values,    diagonal,          engine<T>().kernel_table.layout,
+                             isa,       condition_limit()};
+    FactorOutcome outcome = factor_tree<T, N>(input, engine<T>().factor);
+    // A singular matrix leaves pivots of rounding error. In 32 bits the contraction tells.
+    const double rounding = std::numeric_limits<double>::epsilon() * kPivotRounding *
+                            std::sqrt(static_cast<double>(symbolic.size()));
+    if (outcome.status == SolveStatus::Ok && outcome.smallest_pivot < rounding)
+      outcome.status = SolveStatus::NotPositiveDefinite;
     factored = outcome.status == SolveStatus::Ok;
     report.substituted_panels = outcome.substituted_panels;
     report.max_condition = outcome.max_condition;
@@ -154,6 +167,8 @@ struct TreeSolver::Impl {
   Isa isa;
   Symbolic symbolic;
   FrontEntries entries;
+  std::vector<int> diagonal_entry;  ///< per position: its diagonal entry's index, -1 without
+  std::vector<double> diagonal;
   std::vector<int> column_begin, row_index;  ///< of the pattern, for the estimate in 32 bits
   std::variant<std::monostate, std::unique_ptr<Engine<float>>, std::unique_ptr<Engine<double>>>
       engine_;
@@ -226,6 +241,14 @@ void TreeSolver::analyze(const SymmetricPattern& pattern, const DomainTree* doma
   const std::vector<int> order = dissection_order(graph, domains, impl.options.seed);
   impl.symbolic = global::analyze(graph, order, boundary, {});
   impl.entries = scatter_entries(pattern, impl.symbolic);
+  impl.diagonal_entry.assign(static_cast<std::size_t>(pattern.size()), -1);
+  impl.diagonal.resize(impl.diagonal_entry.size());
+  for (int c = 0; c < pattern.size(); ++c)
+    for (int k = pattern.column_begin[static_cast<std::size_t>(c)];
+         k < pattern.column_begin[static_cast<std::size_t>(c) + 1]; ++k)
+      if (pattern.row_index[static_cast<std::size_t>(k)] == c)
+        impl.diagonal_entry[static_cast<std::size_t>(
+            impl.symbolic.position[static_cast<std::size_t>(c)])] = k;
   impl.column_begin.clear();
   impl.row_index.clear();
   if (impl.options.precision == Precision::Single && impl.options.contraction_limit > 0) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 
-#include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
 
 namespace piecework::global {
@@ -343,8 +342,8 @@ void TreeSweep<T>::solve(const TreeFactor<T>& factor, const VectorView<const dou
 template <class T>
 void TreeSweep<T>::condense(const TreeFactor<T>& factor, const VectorView<const double>& b,
                             double* boundary) {
-  PIECEWORK_ASSERT(plan_.boundary_front >= 0);
   forward<kMaxLanes>(factor, b);
+  if (plan_.boundary_front < 0) return;
   const Lanes<T> vector = vector_of(plan_.boundary_front);
   const int rows = symbolic_.num_boundary;
   for (int c = 0; c < b.columns; ++c)
@@ -355,13 +354,14 @@ void TreeSweep<T>::condense(const TreeFactor<T>& factor, const VectorView<const 
 template <class T>
 void TreeSweep<T>::expand(const TreeFactor<T>& factor, const double* boundary,
                           const VectorView<double>& x) {
-  PIECEWORK_ASSERT(plan_.boundary_front >= 0);
-  const Lanes<T> vector = vector_of(plan_.boundary_front);
-  const int rows = symbolic_.num_boundary;
-  for (int c = 0; c < kMaxLanes; ++c)
-    for (int r = 0; r < rows; ++r)
-      vector.data[r + c * vector.stride] =
-          c < x.columns ? static_cast<T>(boundary[c * rows + r]) : T(0);
+  if (plan_.boundary_front >= 0) {
+    const Lanes<T> vector = vector_of(plan_.boundary_front);
+    const int rows = symbolic_.num_boundary;
+    for (int c = 0; c < kMaxLanes; ++c)
+      for (int r = 0; r < rows; ++r)
+        vector.data[r + c * vector.stride] =
+            c < x.columns ? static_cast<T>(boundary[c * rows + r]) : T(0);
+  }
   backward<kMaxLanes>(factor, x);
 }
 
