@@ -26,14 +26,22 @@ struct Hit {
   double distance = std::numeric_limits<double>::infinity();
 };
 
+/// A vertex's own edges, and ends of edges at its own neighbours, are no place to be sewn to.
 Hit nearest_edge(const Positions& x, int vertex, const Edges& edges) {
   Hit best{.vertex = vertex};
+  std::vector<int> neighbors;
+  for (const auto& [a, b] : edges)
+    if (a == vertex || b == vertex) neighbors.push_back(a == vertex ? b : a);
+  const auto is_neighbor = [&](int v) {
+    return std::find(neighbors.begin(), neighbors.end(), v) != neighbors.end();
+  };
   const Vec3 p = x.row(vertex).transpose();
   for (const auto& [a, b] : edges) {
     if (a == vertex || b == vertex) continue;
     const Vec3 from = x.row(a).transpose();
     const Vec3 along = x.row(b).transpose() - from;
     const double ratio = std::clamp((p - from).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    if ((ratio == 0 && is_neighbor(a)) || (ratio == 1 && is_neighbor(b))) continue;
     const double distance = (p - from - ratio * along).norm();
     if (distance < best.distance) best = {vertex, a, b, ratio, distance};
   }
@@ -169,6 +177,23 @@ std::vector<Stitch> stitch_near(const Positions& x, const Edges& first, const Ed
         {.vertex = hit.vertex, .a = hit.a, .b = hit.b, .ratio = hit.ratio, .yields = true});
   }
   return stitches;
+}
+
+std::vector<int> collapsed_triangles(const Triangles& triangles, const SeamMap& seams) {
+  std::vector<int> collapsed;
+  if (seams.empty()) return collapsed;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    std::array<int, 3> place{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int v = triangles[t][k];
+      place[k] = -1 - v;  // like no other
+      if (!has_one_carrier(seams, v)) continue;
+      seams.visit_carriers(v, [&](int carrier, double) { place[k] = carrier; });
+    }
+    if (place[0] == place[1] || place[1] == place[2] || place[2] == place[0])
+      collapsed.push_back(static_cast<int>(t));
+  }
+  return collapsed;
 }
 
 std::vector<std::array<int, 2>> seam_neighbors(const Triangles& triangles, const SeamMap& seams) {

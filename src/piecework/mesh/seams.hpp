@@ -46,11 +46,10 @@ struct SeamChain {
 std::vector<Stitch> stitch_chains(const SeamChain& a, const SeamChain& b, const std::string& where);
 
 /// Sews borders that lie side by side in `x`: each vertex of the finer side onto the nearest edge
-/// of the other within `distance` (m), edges that contain the vertex itself left out. Which side is
-/// finer is decided for each pair of uninterrupted runs of border vertices that found something.
-/// All stitches yield.
-/// \param x             positions, |V| x 3, m
-/// \param first, second border edges of the two cloths; the same edges sew a cloth to itself
+/// of the other within `distance` (m); its own edges and its own neighbours are no place to be sewn
+/// to. Which side is finer is decided for each pair of uninterrupted runs of border vertices that
+/// found something. All stitches yield. \param x             positions, |V| x 3, m \param first,
+/// second border edges of the two cloths; the same edges sew a cloth to itself
 std::vector<Stitch> stitch_near(const Positions& x, const std::vector<std::array<int, 2>>& first,
                                 const std::vector<std::array<int, 2>>& second, double distance);
 
@@ -95,6 +94,9 @@ struct SeamMap {
 /// \throws InputError that names seam and vertex: a vertex out of range, a ratio outside 0 to 1, a
 ///         vertex sewn onto two different edges, a vertex that through others hangs on itself.
 SeamMap resolve_seams(std::span<const Stitch> stitches, int num_vertices, const SeamNames& names);
+
+/// Triangles two corners of which have become one vertex: a seam has sewn neighbours to each other.
+std::vector<int> collapsed_triangles(const Triangles& triangles, const SeamMap& seams);
 
 /// Pairs of triangles that face each other across a seam, t0 < t1, ascending, each once: one with
 /// an edge of slaves, and one with an edge whose two ends are carried by one free vertex each, both

@@ -325,6 +325,18 @@ TEST(SeamsByDistance, FarBordersAreLeftAlone) {
   EXPECT_EQ(stitch_near(mesh.positions, left, right, 0.11).size(), 3U);
 }
 
+TEST(Seams, FindsTrianglesThatCollapse) {
+  const TriangleMesh mesh = testing::grid_mesh(3, 3);
+  const auto collapsed = [&](const Stitch& stitch) {
+    return collapsed_triangles(mesh.triangles, resolve({stitch}, 9)).size();
+  };
+  EXPECT_TRUE(collapsed_triangles(mesh.triangles, {}).empty());
+  EXPECT_EQ(collapsed({.vertex = 8, .a = 0, .b = 1, .ratio = 0}), 0U);
+  EXPECT_EQ(collapsed({.vertex = 4, .a = 0, .b = 2, .ratio = 0.5}), 0U);
+  EXPECT_EQ(collapsed({.vertex = 5, .a = 8, .b = 1, .ratio = 0}), 1U);  // a border edge
+  EXPECT_EQ(collapsed({.vertex = 4, .a = 5, .b = 1, .ratio = 0}), 2U);  // an inner one
+}
+
 /// Brute force: triangles of different patches whose sides overlap by more than a point.
 std::set<std::array<int, 2>> overlapping_sides(const TriangleMesh& mesh) {
   std::set<std::array<int, 2>> pairs;

@@ -217,6 +217,9 @@ std::string to_markdown(const RunRecord& record, const World& world) {
   if (record.setup.factor_nonzeros > 0)
     text += fmt::format("Factor: {} nonzeros, {} MB.\n", three_digits(record.setup.factor_nonzeros),
                         three_digits(record.setup.factor_bytes / 1e6));
+  if (!world.model.sewing.empty())
+    text += fmt::format("Seams: {} of {} vertices follow others.\n",
+                        world.model.sewing.map().num_slaves(), world.model.num_vertices());
   if (disturbed)
     text += fmt::format("\n† Disturbed: other work kept {} processors busy during the run.\n",
                         three_digits(record.other_processors));

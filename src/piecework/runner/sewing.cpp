@@ -54,6 +54,7 @@ class Seamstress {
           fmt::format("{} stitches found by distance were left out: their vertices are sewn "
                       "already, or carry what they would follow",
                       map.dropped));
+    note_collapsed(map);
     world_.model.sewing = model::Sewing(std::move(map), model.start);
     check_closed();
     world_.seam_neighbors = mesh::seam_neighbors(model.triangles, model.sewing.map());
@@ -208,6 +209,17 @@ class Seamstress {
         add_chains(numbers(from_, seam.chain, here), numbers(from_, seam.to_chain, here), here);
       add_stitches(seam.stitches, here);
     }
+  }
+
+  /// Patterns of real garments do that at the ends of pleats; a triangle without area is allowed.
+  void note_collapsed(const mesh::SeamMap& map) {
+    const std::vector<int> collapsed = mesh::collapsed_triangles(world_.model.triangles, map);
+    if (collapsed.empty()) return;
+    const auto [i, j, k] = world_.model.triangles[static_cast<std::size_t>(collapsed.front())];
+    world_.notes.push_back(fmt::format(
+        "seams sew two corners of one triangle to each other, {} times; the first is "
+        "{}, {}, {}: these triangles have no area",
+        collapsed.size(), world_.vertex_name(i), world_.vertex_name(j), world_.vertex_name(k)));
   }
 
   void check_closed() const {

@@ -137,6 +137,7 @@ TEST(SewingScene, RefusalsSayWhatToChange) {
          "is no single path along a border");
   expect(refusal(R"({"cloth": "left", "to": "right", "distance": 0.01})", 0.3),
          "no border vertex lies within 0.01 m");
+  expect(refusal(R"({"cloth": "left", "distance": 0.4})"), "no border vertex lies within 0.4 m");
 }
 
 TEST(SewingScene, RulesBetweenKeys) {
@@ -167,6 +168,16 @@ TEST(SewingScene, PinsOnTheSeam) {
                       "left; that is held by panels.json: /cloths/0/pins/0"),
             std::string::npos)
       << text;
+}
+
+TEST(SewingScene, CollapsedTrianglesAreNoted) {
+  const auto world =
+      build_world(two_panels(R"({"cloth": "left", "stitches": [[0, 1, 2, 0]], "close_time": 1})"));
+  ASSERT_EQ(world->notes.size(), 1U);
+  EXPECT_EQ(
+      world->notes[0],
+      "seams sew two corners of one triangle to each other, 1 times; the first is vertex 0 of "
+      "left, vertex 5 of left, vertex 1 of left: these triangles have no area");
 }
 
 TEST(SewingScene, HashesKnowTheSeams) {
@@ -208,6 +219,8 @@ TEST(SewingScene, ClosesWhileARunIsInterruptedAndResumed) {
   run(scene, options, rest);
   EXPECT_TRUE(rest.x == whole.x) << "the same bits";
   EXPECT_NE(read_file(options.directory / "run.json").find("\"sewn_vertices\": 9"),
+            std::string::npos);
+  EXPECT_NE(read_file(options.directory / "summary.md").find("Seams: 9 of 56 vertices"),
             std::string::npos);
 }
 
