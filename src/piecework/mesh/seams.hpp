@@ -2,7 +2,7 @@
 
 // Sewing: chains of vertices or neighbouring borders -> stitches -> which vertices follow which.
 // Non-conforming seams by elimination, x = T x_free [Lu25, Sec. 4.4; differs, docs/architecture.md
-// D15 to D17].
+// D16 to D18].
 
 #include <array>
 #include <functional>

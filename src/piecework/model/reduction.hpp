@@ -15,7 +15,7 @@ using Unknowns = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor>;
 
 /// x = T_f x_f + constant: T_f is T of the seams without the columns of held vertices, |V| x n_f.
 /// Every solver works on
-///     K~ = T_f^T K T_f,   T_f^T grad E,   dx = T_f dx_f        [Lu25, Eq. 3; Sec. 4.4, D16]
+///     K~ = T_f^T K T_f,   T_f^T grad E,   dx = T_f dx_f        [Lu25, Eq. 3; Sec. 4.4, D17]
 /// Without seams these are rows and columns of K and rows of grad E, as they stand.
 class Reduction {
  public:

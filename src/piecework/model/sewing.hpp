@@ -1,7 +1,7 @@
 #pragma once
 
 // Sewn vertices during a simulation: x = T x_free + o(t) [Lu25, Sec. 4.4, by elimination;
-// docs/architecture.md D15 to D17].
+// docs/architecture.md D16 to D18].
 
 #include <vector>
 

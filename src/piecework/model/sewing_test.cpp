@@ -204,7 +204,7 @@ TEST(Reduction, NestedSeamsPassThePatchTest) {
 }
 
 // The error of non-nested seams is that of the trapezoid rule on the seam's tractions; the paper's
-// rule, that the coarse side follows, is far worse even where nodes are nested. (D15)
+// rule, that the coarse side follows, is far worse even where nodes are nested. (D16)
 TEST(Reduction, NonNestedSeamsPassWithinASmallErrorAndCoarseSlavesDoNot) {
   const double six_seven = patch_test_error({{0, 0, 1, 1, 7, 7}, {1, 0, 2, 1, 7, 8}});
   const double eight_twenty = patch_test_error({{0, 0, 1, 1, 9, 9}, {1, 0, 2, 1, 9, 21}});

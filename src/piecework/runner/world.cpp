@@ -13,6 +13,7 @@
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/generate.hpp>
 #include <piecework/mesh/import.hpp>
+#include <piecework/pd/primal_dual_step.hpp>
 #include <piecework/runner/sewing.hpp>
 
 namespace piecework::runner {
@@ -252,7 +253,15 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
 namespace {
 
 std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
-  if (world.scene.solver.global == "single") return global::make_cholmod_solver();
+  const scene::Solver& solver = world.scene.solver;
+  if (solver.global == "single") return global::make_cholmod_solver();
+  if (solver.global == "primal_dual") {
+    pd::PrimalDualStepOptions options{.corner_fraction = solver.corner_fraction};
+    options.solver.interface = solver.interface == "dense"    ? global::InterfaceKind::Dense
+                               : solver.interface == "sparse" ? global::InterfaceKind::Sparse
+                                                              : global::InterfaceKind::Recursive;
+    return pd::make_primal_dual_solver(world.model, world.domains, world.scene.step.h, options);
+  }
   global::VertexTree domains;
   if (world.domains.num_domains > 1) {
     for (const auto& node : world.domains.nodes) domains.node_parent.push_back(node.parent);

@@ -133,6 +133,8 @@ struct Solver {
   std::string global = "tree";
   std::string local = "jacobi";
   int domains = 32;
+  double corner_fraction = 0.5;
+  std::string interface = "recursive";
   int threads = 0;  ///< 0: what the machine allows
 
   bool operator==(const Solver&) const = default;

@@ -343,6 +343,9 @@ void fields(V& v, Solver& s) {
   v.choice({"global", "global solve"}, s.global,
            {{"tree",
              "exact and parallel: nested dissection whose top cuts are the borders of the domains"},
+            {"primal_dual",
+             "exact and by domains, as the paper has it (corrected): multipliers where two domains "
+             "meet, corners where more do"},
             {"single",
              "one sparse Cholesky factor of the whole system (CHOLMOD), on one thread: the "
              "baseline"}});
@@ -350,6 +353,14 @@ void fields(V& v, Solver& s) {
            {{"jacobi", "all constraints projected at the same positions, in parallel"}});
   v.value({"domains", "domains to divide the cloths into (1: undivided)"}, s.domains,
           between(1, 65536));
+  v.value({"corner_fraction",
+           "`global: primal_dual`: share of the vertices of two domains that become corners"},
+          s.corner_fraction, between(0, 1));
+  v.choice({"interface", "`global: primal_dual`: how the matrix of the multipliers is solved"},
+           s.interface,
+           {{"recursive", "sparse, by nested dissection, in parallel"},
+            {"sparse", "sparse, by CHOLMOD on one thread"},
+            {"dense", "dense, as the paper says; memory grows with vertices times domains"}});
   v.value({"threads", "worker threads; 0: what affinity and cgroup quota allow"}, s.threads,
           between(0, 1024));
 }

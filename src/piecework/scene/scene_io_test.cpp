@@ -114,7 +114,7 @@ Scene expected_every_key() {
   scene.gravity = {1, 2, 3};
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;
-  scene.solver = {"vanilla_pd", "single", "jacobi", 5, 3};
+  scene.solver = {"vanilla_pd", "single", "jacobi", 5, 0.5, "recursive", 3};
   scene.quality = {"dx_rms", 1e-3, 11, 2};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();
