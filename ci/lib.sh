@@ -119,7 +119,7 @@ build() {
 # The C++ files under version control (or, outside of git, of the source folders), one a line.
 cpp_files() {
   git -C "$root" ls-files '*.cpp' '*.hpp' 2>/dev/null ||
-    (cd "$root" && find src renderer benchmarks -name '*.cpp' -o -name '*.hpp' | sort)
+    (cd "$root" && find src renderer benchmarks examples -name '*.cpp' -o -name '*.hpp' | sort)
 }
 
 # Options of the sanitizers, with the suppressions of ci/sanitizers where there are any.

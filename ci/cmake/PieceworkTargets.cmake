@@ -22,6 +22,7 @@ function(piecework_module)
   add_library(piecework_${M_NAME} STATIC ${M_SOURCES})
   add_library(piecework::${M_NAME} ALIAS piecework_${M_NAME})
   set_target_properties(piecework_${M_NAME} PROPERTIES EXPORT_NAME ${M_NAME} FOLDER src)
+  target_compile_features(piecework_${M_NAME} PUBLIC cxx_std_20)
   target_sources(piecework_${M_NAME}
     PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR}/src FILES ${M_HEADERS})
   target_link_libraries(piecework_${M_NAME}
@@ -46,7 +47,7 @@ function(piecework_test)
   target_compile_definitions(piecework_${T_NAME}_test PRIVATE
     PIECEWORK_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     PIECEWORK_SHARED_DATA="${PROJECT_SOURCE_DIR}/../shared/data"
-    PIECEWORK_PROGRAM="${CMAKE_BINARY_DIR}/bin/piecework")
+    PIECEWORK_PROGRAM="${PROJECT_BINARY_DIR}/bin/piecework")
   gtest_discover_tests(piecework_${T_NAME}_test
     PROPERTIES LABELS ${T_LABEL} TIMEOUT 900 DISCOVERY_TIMEOUT 120)
   # All test programs of one label, say `unit_tests`: what the sanitizer runs build.

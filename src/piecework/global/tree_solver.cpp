@@ -38,6 +38,30 @@ void check_pattern(const SymmetricPattern& pattern) {
   }
 }
 
+void check_domains(const DomainTree& domains, int rows) {
+  const auto nodes = static_cast<int>(domains.node_parent.size());
+  if (static_cast<int>(domains.row_node.size()) != rows)
+    throw InputError(fmt::format("domain tree: {} rows have a node, the matrix has {}",
+                                 domains.row_node.size(), rows));
+  for (int node = 0; node < nodes; ++node)
+    if (const int parent = domains.node_parent[static_cast<std::size_t>(node)];
+        parent < -1 || parent >= node)
+      throw InputError(
+          fmt::format("domain tree: node {} has parent {}; parents come first", node, parent));
+  for (const int node : domains.row_node)
+    if (node < 0 || node >= nodes)
+      throw InputError(fmt::format("domain tree: a row has node {} of {}", node, nodes));
+}
+
+void check_boundary(std::span<const int> boundary, int rows) {
+  std::vector<char> seen(static_cast<std::size_t>(rows), 0);
+  for (const int row : boundary) {
+    if (row < 0 || row >= rows || seen[static_cast<std::size_t>(row)])
+      throw InputError(fmt::format("boundary: row {} is out of range or named twice", row));
+    seen[static_cast<std::size_t>(row)] = 1;
+  }
+}
+
 /// Pivots below so many roundings (times the root of the number of rows) of their diagonal entry
 /// are those of a singular matrix. Chosen.
 constexpr double kPivotRounding = 10;
@@ -167,6 +191,7 @@ struct TreeSolver::Impl {
   Isa isa;
   Symbolic symbolic;
   FrontEntries entries;
+  std::size_t num_values = 0;       ///< entries of the pattern
   std::vector<int> diagonal_entry;  ///< per position: its diagonal entry's index, -1 without
   std::vector<double> diagonal;
   std::vector<int> column_begin, row_index;  ///< of the pattern, for the estimate in 32 bits
@@ -231,7 +256,10 @@ TreeSolver& TreeSolver::operator=(TreeSolver&&) noexcept = default;
 void TreeSolver::analyze(const SymmetricPattern& pattern, const DomainTree* domains,
                          std::span<const int> boundary) {
   check_pattern(pattern);
+  if (domains) check_domains(*domains, pattern.size());
+  check_boundary(boundary, pattern.size());
   Impl& impl = *impl_;
+  impl.num_values = pattern.size() > 0 ? static_cast<std::size_t>(pattern.column_begin.back()) : 0;
   impl.factored = false;
   impl.report = {};
   Stopwatch watch;
@@ -267,6 +295,9 @@ void TreeSolver::analyze(const SymmetricPattern& pattern, const DomainTree* doma
 SolveStatus TreeSolver::factor(std::span<const double> values) {
   Impl& impl = *impl_;
   if (impl.engine_.index() == 0) return SolveStatus::NotFactored;
+  if (values.size() != impl.num_values)
+    throw InputError(fmt::format("matrix values: {} given for a pattern of {} entries",
+                                 values.size(), impl.num_values));
   Stopwatch watch;
   try {
     SolveStatus status = impl.factor_as_asked(values);

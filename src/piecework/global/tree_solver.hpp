@@ -55,8 +55,12 @@ struct TreeReport : FactorReport {
 };
 
 /// A X = B with A symmetric positive definite, |V| x |V|, any number of right-hand sides, three
-/// at a time. Uses the threads of the caller's arena; results do not depend on their
-/// number. One object is used by one caller at a time; no allocation in solve().
+/// at a time. One object is used by one caller at a time; no allocation in solve().
+///
+/// Parallel loops run in the oneTBB task arena of the calling thread: call from within
+/// tbb::task_arena::execute() or ThreadPool::run() (core/parallel.hpp) to choose the number of
+/// threads, else all cores are used. Results do not depend on it. factor() sets OpenBLAS to one
+/// thread, for the whole process.
 class TreeSolver {
  public:
   explicit TreeSolver(const TreeOptions& options = {});
@@ -67,13 +71,15 @@ class TreeSolver {
   /// Orders and plans; the spans are not needed afterwards. Drops any factor.
   /// \param domains   optional: domains whose borders become the top separators
   /// \param boundary  optional: rows that are kept to the end and not eliminated; see condense()
-  /// \throws InputError if the pattern is malformed (sizes, row out of range).
+  /// \throws InputError if the pattern, the domains or the boundary are malformed (sizes, numbers
+  /// out
+  ///         of range or named twice).
   void analyze(const SymmetricPattern& pattern, const DomainTree* domains = nullptr,
                std::span<const int> boundary = {});
 
-  /// Factors values on the analysed pattern, in the order of its row_index. Afterwards the solver
-  /// has this factor, or none if the status is not Ok (NotPositiveDefinite: indefinite, singular or
-  /// not finite).
+  /// Factors values on the analysed pattern, one for each entry of its row_index. Afterwards the
+  /// solver has this factor, or none if the status is not Ok (NotPositiveDefinite: indefinite,
+  /// singular or not finite).
   [[nodiscard]] SolveStatus factor(std::span<const double> values);
 
   /// X = A^-1 B; number c of row i at b[i * row_stride + c * column_stride]. b and x may be the

@@ -308,6 +308,20 @@ TEST(TreeSolver, MalformedPatternsAreRefused) {
   EXPECT_THROW(TreeSolver().analyze({backwards, rows}), InputError);
   const std::vector<int> long_begin{0, 1, 9};
   EXPECT_THROW(TreeSolver().analyze({long_begin, rows}), InputError);
+
+  const std::vector<int> good_rows{0, 1};
+  const SymmetricPattern good{begin, good_rows};
+  const std::vector<int> parents{-1, 0, 0};
+  for (const std::vector<int>& nodes : {std::vector{0}, {0, 3}, {-1, 0}}) {
+    const DomainTree tree{parents, nodes};
+    EXPECT_THROW(TreeSolver().analyze(good, &tree), InputError);
+  }
+  for (const std::vector<int>& boundary : {std::vector{2}, {-1}, {1, 1}})
+    EXPECT_THROW(TreeSolver().analyze(good, nullptr, boundary), InputError);
+  TreeSolver solver;
+  solver.analyze(good);
+  EXPECT_THROW((void)solver.factor(std::vector{1.0}), InputError);
+  EXPECT_EQ(solver.factor(std::vector{1.0, 2.0}), SolveStatus::Ok);
 }
 
 /// Rows kept to the end: Schur complement and the two half solves against dense algebra.

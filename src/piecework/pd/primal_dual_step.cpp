@@ -68,11 +68,11 @@ class PrimalDualStep final : public global::ExactSolver {
                  double h, PrimalDualStepOptions options)
       : model_(model),
         options_(std::move(options)),
-        shares_(model::assemble_domain_systems(model,
-                                               {domains.num_domains, domains.triangle_domain,
-                                                domains.hinge_domain,
-                                                owning_domains(model, domains)},
-                                               h)) {}
+        shares_(
+            model::assemble_domain_systems(model,
+                                           {domains.num_domains, domains.triangle_domain,
+                                            domains.hinge_domain, owning_domains(model, domains)},
+                                           h)) {}
 
   global::SolveStatus factor(const SparseMatrix& K, std::span<const int> row_vertex) override {
     std::vector<char> fixed(static_cast<std::size_t>(model_.num_vertices()), 1);
@@ -81,9 +81,8 @@ class PrimalDualStep final : public global::ExactSolver {
     std::vector<DomainMatrix> domains;
     for (const DomainMatrix& share : shares_)
       domains.push_back(reduce(share, reduction, model_.num_vertices()));
-    global::InterfaceDofs dofs =
-        global::classify_dofs(domains, static_cast<int>(K.rows()),
-                              {.corner_fraction = options_.corner_fraction});
+    global::InterfaceDofs dofs = global::classify_dofs(
+        domains, static_cast<int>(K.rows()), {.corner_fraction = options_.corner_fraction});
     const global::SolveStatus status = solver_.factor(domains, std::move(dofs), options_.solver);
     const global::PrimalDualReport& primal_dual = solver_.report();
     report_ = {};

@@ -37,8 +37,7 @@ double difference(const model::ClothModel& model, const decomposition::Elements&
 }
 
 TEST(PrimalDualStep, HeldVerticesAreEliminatedInEveryShare) {
-  const auto model =
-      testing::cloth_model(testing::grid_mesh(30, 30), {0.5, 2e4, 2e-2});
+  const auto model = testing::cloth_model(testing::grid_mesh(30, 30), {0.5, 2e4, 2e-2});
   const decomposition::Elements elements{model.triangles, model.hinges, model.hinge_bends,
                                          model.num_vertices()};
   for (const double corner_fraction : {0.0, 0.5, 1.0})
@@ -48,10 +47,9 @@ TEST(PrimalDualStep, HeldVerticesAreEliminatedInEveryShare) {
 TEST(PrimalDualStep, SlavesOfSeamsAreEliminatedInEveryShare) {
   const auto patches = testing::four_patches();
   auto model = testing::cloth_model(testing::patchwork(patches), {0.5, 2e4, 2e-2});
-  model.sewing = model::Sewing(
-      mesh::resolve_seams(testing::geometric_stitches(patches), model.num_vertices(),
-                          testing::plain_names()),
-      model.start);
+  model.sewing = model::Sewing(mesh::resolve_seams(testing::geometric_stitches(patches),
+                                                   model.num_vertices(), testing::plain_names()),
+                               model.start);
   ASSERT_GT(model.sewing.map().num_slaves(), 25);
   decomposition::Elements elements{model.triangles, model.hinges, model.hinge_bends,
                                    model.num_vertices()};
