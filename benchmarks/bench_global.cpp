@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <iostream>  // Eigen/MetisSupport uses it without including it
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,7 @@
 #include <piecework/decomposition/decomposition.hpp>
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/global/eigen_views.hpp>
+#include <piecework/global/primal_dual.hpp>
 #include <piecework/global/tree_solver.hpp>
 #include <piecework/mesh/generate.hpp>
 #include <piecework/model/assembly.hpp>
@@ -188,6 +190,52 @@ Method refactor(Problem& p, const Row& row, const global::TreeOptions& options) 
   return method;
 }
 
+/// The paper's method, with its own domains; the parts of a solve are reported as Fig. 9 stacks
+/// them.
+Method primal_dual(Problem& p, const Row& row, const global::PrimalDualOptions& options) {
+  struct State {
+    global::PrimalDual solver;
+    global::RightHandSides x;
+    std::vector<double> domains_ms, interface_ms, refinements;
+  };
+  auto state = std::make_shared<State>();
+  Method method;
+  method.set_up = [=, &p] {
+    const auto parts = decomposition::decompose(
+        {p.model.triangles, p.model.hinges, p.model.hinge_bends, p.model.num_vertices()},
+        {.domains = row.domains});
+    const auto shares = model::assemble_domain_systems(
+        p.model,
+        {parts.num_domains, parts.triangle_domain, parts.hinge_domain, parts.vertex_domains}, kH);
+    auto dofs = global::classify_dofs(shares, p.model.num_vertices(), {.corner_fraction = 0});
+    if (state->solver.factor(shares, std::move(dofs), options) != global::SolveStatus::Ok)
+      throw std::runtime_error("not positive definite");
+  };
+  method.run = [=, &p](Positions& x) {
+    state->x = p.b;
+    if (state->solver.solve(state->x) != global::SolveStatus::Ok)
+      throw std::runtime_error("solve failed");
+    x = state->x;
+    const global::PrimalDualTimes& times = state->solver.last_times();
+    state->domains_ms.push_back(times.domains_ms);
+    state->interface_ms.push_back(times.interface_ms);
+    state->refinements.push_back(times.refinements);
+  };
+  method.count = [=](Counters& counters) {
+    const global::PrimalDualReport& report = state->solver.report();
+    counters["nnz"] = report.domain_nonzeros + report.interface_nonzeros;
+    counters["bytes"] = static_cast<double>(report.domain_bytes + report.interface_bytes);
+    counters["analyze_ms"] = report.analyze_ms;
+    counters["factor_ms"] = report.factor_ms - report.analyze_ms;
+    counters["multipliers"] = report.num_multipliers;
+    counters["corners"] = report.num_corners;
+    counters["domains_ms"] = median_interval(state->domains_ms).median;
+    counters["interface_ms"] = median_interval(state->interface_ms).median;
+    counters["refinements"] = median_interval(state->refinements).median;
+  };
+  return method;
+}
+
 Method cholmod(Problem& p) {
   Method method;
   method.set_up = [] {};
@@ -338,6 +386,21 @@ Method refactor_f32(Problem& p, const Row& row) {
   return refactor(p, row, options);
 }
 
+Method primal_dual_ours(Problem& p, const Row& row) {
+  return primal_dual(p, row, {.refine_tolerance = std::numeric_limits<double>::infinity()});
+}
+Method primal_dual_refined(Problem& p, const Row& row) {
+  return primal_dual(p, row, {.refine_tolerance = 0, .max_refinements = 1});
+}
+/// As printed: CHOLMOD in each domain, twice per solve, and on one thread for the interface.
+Method primal_dual_literal(Problem& p, const Row& row) {
+  return primal_dual(p, row,
+                     {.form = global::DomainForm::Literal,
+                      .interface = global::InterfaceKind::Sparse,
+                      .refine_tolerance = std::numeric_limits<double>::infinity(),
+                      .backend = global::reference_backend()});
+}
+
 void register_size(std::int64_t n) {
   const std::vector<std::int64_t> all{1, 4, 8, 16, 32, 64, 128};
   const std::vector<std::int64_t> domains = quick() ? std::vector<std::int64_t>{1, 8} : all;
@@ -360,8 +423,19 @@ void register_size(std::int64_t n) {
   }
   add("read_limit_f64", read_f64, {n}, {1}, threads);
   add("read_limit_f32", read_f32, {n}, {1}, threads);
-  add("tree_f64", tree_f64, {n}, domains, threads);
-  add("tree_f32", tree_f32, {n}, domains, threads);
+  const bool large = n >= 1000000;  // their set-up takes a minute
+  const std::vector<std::int64_t> tree_domains = large ? std::vector<std::int64_t>{1, 32} : domains;
+  add("tree_f64", tree_f64, {n}, tree_domains, large ? std::vector<std::int64_t>{2} : threads);
+  add("tree_f32", tree_f32, {n}, tree_domains, large ? std::vector<std::int64_t>{2} : threads);
+  const std::vector<std::int64_t> several(domains.begin() + 1, domains.end());
+  if (n < 1000000) {
+    add("literal_primal_dual", primal_dual_literal, {n}, several, threads);
+    add("primal_dual", primal_dual_ours, {n}, several, threads);
+    add("primal_dual_refined", primal_dual_refined, {n}, {8}, {1, 2});
+  } else {
+    add("literal_primal_dual", primal_dual_literal, {n}, {32}, {2});
+    add("primal_dual", primal_dual_ours, {n}, {32}, {2});
+  }
   add("refactor_f64", refactor_f64, {n}, {1}, threads);
   add("refactor_f32", refactor_f32, {n}, {1}, threads);
   add("tree_f64", tree_f64, {n}, {1}, {1, 2}, false);
