@@ -102,12 +102,15 @@ struct FrontMatrix {
 template <class T, class N>
 class Factorizer {
  public:
-  Factorizer(const NumericInput& input, TreeFactor<T>& factor)
+  Factorizer(const NumericInput& input, const Scope& scope, TreeFactor<T>& factor,
+             UpdateMatrices<N>& updates)
       : input_(input),
+        scope_(scope),
         symbolic_(*input.symbolic),
         plan_(*input.plan),
         kernels_(kernels<N>(input.isa).dense),
-        factor_(factor) {}
+        factor_(factor),
+        updates_(updates) {}
 
   FactorOutcome run();
 
@@ -140,12 +143,17 @@ class Factorizer {
   void pack(const N* from, int ld, int rows, int cols, N sign, T* to) const;
   void note(const FactorOutcome& part, FactorOutcome& whole) const;
 
+  [[nodiscard]] bool in_scope(int f) const {
+    return scope_.changed.empty() || scope_.changed[static_cast<std::size_t>(f)] != 0;
+  }
+
   const NumericInput& input_;
+  const Scope& scope_;
   const Symbolic& symbolic_;
   const TreePlan& plan_;
   const DenseKernels<N>& kernels_;
   TreeFactor<T>& factor_;
-  std::vector<AlignedArray<N>> updates_;  ///< of roots of subtrees and of fronts above them
+  UpdateMatrices<N>& updates_;
 };
 
 /// Largest sum of magnitudes of a column.
@@ -168,7 +176,11 @@ double norm1(int n, const N* a, int lda) {
 
 template <class T, class N>
 void Factorizer<T, N>::assemble(int f, const FrontMatrix<N>& matrix) {
-  std::memset(matrix.data, 0, FrontMatrix<N>::numbers(front(f)) * sizeof(N));
+  const int stride = matrix.stride();
+  for (int c = 0; c < matrix.size(); ++c) {  // from the chunk of the diagonal down
+    const int first = c / 16 * 16;
+    std::memset(matrix.at(first, c), 0, static_cast<std::size_t>(stride - first) * sizeof(N));
+  }
   const FrontEntries& entries = *input_.entries;
   for (std::size_t e = entries.begin[static_cast<std::size_t>(f)];
        e < entries.begin[static_cast<std::size_t>(f) + 1]; ++e)
@@ -387,7 +399,7 @@ void Factorizer<T, N>::factor_top(int f, Scratch& scratch) {
   assemble(f, matrix);
   for (const int child : plan_.children[static_cast<std::size_t>(f)]) {
     extend_add(child, updates_[static_cast<std::size_t>(child)].data(), f, matrix, scratch.runs);
-    updates_[static_cast<std::size_t>(child)] = {};
+    if (!scope_.keep_updates) updates_[static_cast<std::size_t>(child)] = {};
   }
   if (f == plan_.boundary_front) {
     const auto size = static_cast<std::size_t>(matrix.size());
@@ -423,8 +435,7 @@ FactorOutcome Factorizer<T, N>::run() {
   dense::use_one_thread();
   if (factor_.numbers.size() != plan_.factor_numbers)
     factor_.numbers = AlignedArray<T>(plan_.factor_numbers);
-  factor_.substituted.assign(plan_.panels.size(), 0);
-  factor_.schur.clear();
+  factor_.substituted.resize(plan_.panels.size(), 0);
   updates_.resize(symbolic_.fronts.size());
   FactorOutcome start;
   start.min_pivot = std::numeric_limits<double>::infinity();
@@ -437,7 +448,8 @@ FactorOutcome Factorizer<T, N>::run() {
         Scratch scratch;
         scratch.outcome = start;
         for (const int s : plan_.tasks[t]) {
-          factor_subtree(plan_.subtrees[static_cast<std::size_t>(s)], scratch);
+          const Subtree& subtree = plan_.subtrees[static_cast<std::size_t>(s)];
+          if (in_scope(subtree.last_front)) factor_subtree(subtree, scratch);
           if (scratch.outcome.status != SolveStatus::Ok) break;
         }
         outcomes[t] = scratch.outcome;
@@ -452,7 +464,7 @@ FactorOutcome Factorizer<T, N>::run() {
         [&](std::size_t i) {
           Scratch scratch;
           scratch.outcome = start;
-          factor_top(level[i], scratch);
+          if (in_scope(level[i])) factor_top(level[i], scratch);
           outcomes[i] = scratch.outcome;
         },
         1);
@@ -464,12 +476,18 @@ FactorOutcome Factorizer<T, N>::run() {
 }  // namespace
 
 template <class T, class N>
-FactorOutcome factor_tree(const NumericInput& input, TreeFactor<T>& factor) {
-  return Factorizer<T, N>(input, factor).run();
+FactorOutcome factor_tree(const NumericInput& input, const Scope& scope, TreeFactor<T>& factor,
+                          UpdateMatrices<N>& updates) {
+  const FactorOutcome outcome = Factorizer<T, N>(input, scope, factor, updates).run();
+  if (!scope.keep_updates || outcome.status != SolveStatus::Ok) updates.clear();
+  return outcome;
 }
 
-template FactorOutcome factor_tree<float, float>(const NumericInput&, TreeFactor<float>&);
-template FactorOutcome factor_tree<float, double>(const NumericInput&, TreeFactor<float>&);
-template FactorOutcome factor_tree<double, double>(const NumericInput&, TreeFactor<double>&);
+template FactorOutcome factor_tree<float, float>(const NumericInput&, const Scope&,
+                                                 TreeFactor<float>&, UpdateMatrices<float>&);
+template FactorOutcome factor_tree<float, double>(const NumericInput&, const Scope&,
+                                                  TreeFactor<float>&, UpdateMatrices<double>&);
+template FactorOutcome factor_tree<double, double>(const NumericInput&, const Scope&,
+                                                   TreeFactor<double>&, UpdateMatrices<double>&);
 
 }  // namespace piecework::global

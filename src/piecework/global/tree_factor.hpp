@@ -2,6 +2,7 @@
 
 // Numeric multifrontal factorisation over a planned tree. Private to the global module.
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -40,7 +41,12 @@ struct FactorOutcome {
   double max_condition = 0;
 };
 
-/// A factor in storage type T, computed in type N.
+/// Update matrices of roots of subtrees and of the fronts above them, in type N: kept, they let a
+/// part of the tree be factored anew.
+template <class N>
+using UpdateMatrices = std::vector<AlignedArray<N>>;
+
+/// A factor in storage type T.
 template <class T>
 struct TreeFactor {
   AlignedArray<T> numbers;
@@ -48,6 +54,10 @@ struct TreeFactor {
   std::vector<char> substituted;
   /// Schur complement onto the boundary, lower triangle, column-major; empty without one.
   std::vector<double> schur;
+
+  [[nodiscard]] int num_substituted() const {
+    return static_cast<int>(std::count(substituted.begin(), substituted.end(), 1));
+  }
 };
 
 struct NumericInput {
@@ -61,9 +71,18 @@ struct NumericInput {
   double condition_limit;            ///< pivot blocks above are not inverted
 };
 
+/// Which part of the tree is factored anew.
+struct Scope {
+  /// Per front: its entries or those of a front below it have changed. Empty: all.
+  std::span<const char> changed;
+  bool keep_updates = false;  ///< for a later call with `changed`
+};
+
 /// Factors. On failure the factor's contents are void. Parallel over subtrees, then over the fronts
 /// of a level and the tiles of large ones; the same numbers for every number of threads.
+/// The outcome is that of the part in scope.
 template <class T, class N>
-FactorOutcome factor_tree(const NumericInput& input, TreeFactor<T>& factor);
+FactorOutcome factor_tree(const NumericInput& input, const Scope& scope, TreeFactor<T>& factor,
+                          UpdateMatrices<N>& updates);
 
 }  // namespace piecework::global

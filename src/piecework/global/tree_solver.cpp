@@ -106,6 +106,43 @@ double sum_of(const AlignedArray<T>& numbers) {
       1);
 }
 
+/// What a pattern alone decides; solvers of one pattern share it.
+struct Structure {
+  Symbolic symbolic;
+  FrontEntries entries;
+  std::size_t num_values = 0;       ///< entries of the pattern
+  std::vector<int> diagonal_entry;  ///< per position: its diagonal entry's index, -1 without
+  std::vector<int> front_of;        ///< per row of the matrix
+  std::vector<int> column_begin, row_index;  ///< for the estimate in 32 bits; else empty
+};
+
+std::shared_ptr<const Structure> build_structure(const SymmetricPattern& pattern, Symbolic symbolic,
+                                                 const TreeOptions& options) {
+  auto result = std::make_shared<Structure>();
+  result->symbolic = std::move(symbolic);
+  result->entries = scatter_entries(pattern, result->symbolic);
+  const auto rows = static_cast<std::size_t>(pattern.size());
+  result->num_values =
+      rows > 0 ? static_cast<std::size_t>(pattern.column_begin[rows]) : std::size_t{0};
+  result->diagonal_entry.assign(rows, -1);
+  for (std::size_t c = 0; c < rows; ++c)
+    for (int k = pattern.column_begin[c]; k < pattern.column_begin[c + 1]; ++k)
+      if (pattern.row_index[static_cast<std::size_t>(k)] == static_cast<int>(c))
+        result->diagonal_entry[static_cast<std::size_t>(result->symbolic.position[c])] = k;
+  result->front_of.resize(rows);
+  for (std::size_t f = 0; f < result->symbolic.fronts.size(); ++f) {
+    const Front& front = result->symbolic.fronts[f];
+    for (int c = front.first; c < front.first + front.width; ++c)
+      result->front_of[static_cast<std::size_t>(
+          result->symbolic.order[static_cast<std::size_t>(c)])] = static_cast<int>(f);
+  }
+  if (options.precision == Precision::Single && options.contraction_limit > 0) {
+    result->column_begin.assign(pattern.column_begin.begin(), pattern.column_begin.end());
+    result->row_index.assign(pattern.row_index.begin(), pattern.row_index.end());
+  }
+  return result;
+}
+
 }  // namespace
 
 struct TreeSolver::Impl {
@@ -123,7 +160,7 @@ struct TreeSolver::Impl {
 
   template <class T>
   void make_engine() {
-    engine_ = std::make_unique<Engine<T>>(symbolic, isa);
+    engine_ = std::make_unique<Engine<T>>(structure->symbolic, isa);
     const TreePlan& plan = engine<T>().plan;
     report.stored_numbers = static_cast<double>(plan.factor_numbers);
     report.bytes = plan.factor_numbers * sizeof(T);
@@ -135,32 +172,59 @@ struct TreeSolver::Impl {
     report.precision = sizeof(T) == 4 ? Precision::Single : Precision::Double;
   }
 
+  template <class N>
+  UpdateMatrices<N>& updates() {
+    if constexpr (sizeof(N) == sizeof(float))
+      return float_updates;
+    else
+      return double_updates;
+  }
+
   template <class T, class N>
-  SolveStatus factor_with(std::span<const double> values) {
-    for (std::size_t k = 0; k < diagonal_entry.size(); ++k)
-      diagonal[k] =
-          diagonal_entry[k] < 0 ? 0.0 : values[static_cast<std::size_t>(diagonal_entry[k])];
-    const NumericInput input{&symbolic, &engine<T>().plan, &entries,
-                             values,    diagonal,          engine<T>().kernel_table.layout,
-                             isa,       condition_limit()};
-    FactorOutcome outcome = factor_tree<T, N>(input, engine<T>().factor);
+  SolveStatus factor_with(std::span<const double> values, std::span<const char> changed) {
+    const std::vector<int>& entry = structure->diagonal_entry;
+    diagonal.resize(entry.size());
+    for (std::size_t k = 0; k < entry.size(); ++k)
+      diagonal[k] = entry[k] < 0 ? 0.0 : values[static_cast<std::size_t>(entry[k])];
+    const NumericInput input{&structure->symbolic,
+                             &engine<T>().plan,
+                             &structure->entries,
+                             values,
+                             diagonal,
+                             engine<T>().kernel_table.layout,
+                             isa,
+                             condition_limit()};
+    const Scope scope{changed, options.partial_refactor};
+    FactorOutcome outcome = factor_tree<T, N>(input, scope, engine<T>().factor, updates<N>());
     // A singular matrix leaves pivots of rounding error. In 32 bits the contraction tells.
     const double rounding = std::numeric_limits<double>::epsilon() * kPivotRounding *
-                            std::sqrt(static_cast<double>(symbolic.size()));
+                            std::sqrt(static_cast<double>(structure->symbolic.size()));
     if (outcome.status == SolveStatus::Ok && outcome.smallest_pivot < rounding)
       outcome.status = SolveStatus::NotPositiveDefinite;
     factored = outcome.status == SolveStatus::Ok;
-    report.substituted_panels = outcome.substituted_panels;
+    report.substituted_panels = engine<T>().factor.num_substituted();
     report.max_condition = outcome.max_condition;
     const double ratio = outcome.min_pivot / outcome.max_pivot;
-    report.reciprocal_condition = factored && symbolic.size() > 0 ? ratio * ratio : 0;
+    report.reciprocal_condition = factored && outcome.max_pivot > 0 ? ratio * ratio : 0;
     return outcome.status;
   }
 
-  SolveStatus factor_as_asked(std::span<const double> values) {
-    if (!single()) return factor_with<double, double>(values);
-    return options.factor_in_single ? factor_with<float, float>(values)
-                                    : factor_with<float, double>(values);
+  /// \param changed  per front; empty: everything
+  SolveStatus factor_as_asked(std::span<const double> values, std::span<const char> changed) {
+    if (!single()) return factor_with<double, double>(values, changed);
+    return options.factor_in_single ? factor_with<float, float>(values, changed)
+                                    : factor_with<float, double>(values, changed);
+  }
+
+  void check_size(std::span<const double> values) const {
+    if (values.size() != structure->num_values)
+      throw InputError(fmt::format("matrix values: {} given for a pattern of {} entries",
+                                   values.size(), structure->num_values));
+  }
+
+  [[nodiscard]] bool can_refactor_parts() const {
+    return factored && options.partial_refactor &&
+           !(single() && options.factor_in_single ? float_updates.empty() : double_updates.empty());
   }
 
   template <class Function>
@@ -183,18 +247,30 @@ struct TreeSolver::Impl {
     }
   }
 
+  /// Storage for a factor of `structure`.
+  void prepare() {
+    factored = false;
+    report = {};
+    float_updates.clear();
+    double_updates.clear();
+    if (options.precision == Precision::Single)
+      make_engine<float>();
+    else
+      make_engine<double>();
+    report.nonzeros = structure->symbolic.nonzeros;
+    report.flops = structure->symbolic.flops;
+  }
+
   double estimate_contraction(std::span<const double> values);
   void multiply(std::span<const double> values, std::span<const double> x,
                 std::span<double> y) const;
 
   TreeOptions options;
   Isa isa;
-  Symbolic symbolic;
-  FrontEntries entries;
-  std::size_t num_values = 0;       ///< entries of the pattern
-  std::vector<int> diagonal_entry;  ///< per position: its diagonal entry's index, -1 without
+  std::shared_ptr<const Structure> structure = std::make_shared<Structure>();
   std::vector<double> diagonal;
-  std::vector<int> column_begin, row_index;  ///< of the pattern, for the estimate in 32 bits
+  UpdateMatrices<float> float_updates;
+  UpdateMatrices<double> double_updates;
   std::variant<std::monostate, std::unique_ptr<Engine<float>>, std::unique_ptr<Engine<double>>>
       engine_;
   bool factored = false;
@@ -204,6 +280,8 @@ struct TreeSolver::Impl {
 /// y = A x for kProbes interleaved columns.
 void TreeSolver::Impl::multiply(std::span<const double> values, std::span<const double> x,
                                 std::span<double> y) const {
+  const std::vector<int>& column_begin = structure->column_begin;
+  const std::vector<int>& row_index = structure->row_index;
   std::fill(y.begin(), y.end(), 0.0);
   for (std::size_t c = 0; c + 1 < column_begin.size(); ++c)
     for (int k = column_begin[c]; k < column_begin[c + 1]; ++k) {
@@ -220,7 +298,7 @@ void TreeSolver::Impl::multiply(std::span<const double> values, std::span<const 
 /// Largest energy norm that is left of random errors after one more solve, in the second of
 /// two steps e <- e - M^-1 A e (the first one turns them towards the worst direction).
 double TreeSolver::Impl::estimate_contraction(std::span<const double> values) {
-  const auto n = static_cast<std::size_t>(symbolic.size());
+  const auto n = static_cast<std::size_t>(structure->symbolic.size());
   std::vector<double> error(kProbes * n);
   std::vector<double> image(kProbes * n);
   std::vector<double> change(kProbes * n);
@@ -258,60 +336,40 @@ void TreeSolver::analyze(const SymmetricPattern& pattern, const DomainTree* doma
   check_pattern(pattern);
   if (domains) check_domains(*domains, pattern.size());
   check_boundary(boundary, pattern.size());
-  Impl& impl = *impl_;
-  impl.num_values = pattern.size() > 0 ? static_cast<std::size_t>(pattern.column_begin.back()) : 0;
-  impl.factored = false;
-  impl.report = {};
   Stopwatch watch;
   const graph::Graph graph = pattern.size() > 0
                                  ? graph::graph_of_pattern(pattern.column_begin, pattern.row_index)
                                  : graph::Graph{};
-  const std::vector<int> order = dissection_order(graph, domains, impl.options.seed);
-  impl.symbolic = global::analyze(graph, order, boundary, {});
-  impl.entries = scatter_entries(pattern, impl.symbolic);
-  impl.diagonal_entry.assign(static_cast<std::size_t>(pattern.size()), -1);
-  impl.diagonal.resize(impl.diagonal_entry.size());
-  for (int c = 0; c < pattern.size(); ++c)
-    for (int k = pattern.column_begin[static_cast<std::size_t>(c)];
-         k < pattern.column_begin[static_cast<std::size_t>(c) + 1]; ++k)
-      if (pattern.row_index[static_cast<std::size_t>(k)] == c)
-        impl.diagonal_entry[static_cast<std::size_t>(
-            impl.symbolic.position[static_cast<std::size_t>(c)])] = k;
-  impl.column_begin.clear();
-  impl.row_index.clear();
-  if (impl.options.precision == Precision::Single && impl.options.contraction_limit > 0) {
-    impl.column_begin.assign(pattern.column_begin.begin(), pattern.column_begin.end());
-    impl.row_index.assign(pattern.row_index.begin(), pattern.row_index.end());
-  }
-  if (impl.options.precision == Precision::Single)
-    impl.make_engine<float>();
-  else
-    impl.make_engine<double>();
-  impl.report.nonzeros = impl.symbolic.nonzeros;
-  impl.report.flops = impl.symbolic.flops;
-  impl.report.analyze_ms = watch.elapsed_ms();
+  const std::vector<int> order = dissection_order(graph, domains, impl_->options.seed);
+  impl_->structure =
+      build_structure(pattern, global::analyze(graph, order, boundary, {}), impl_->options);
+  impl_->prepare();
+  impl_->report.analyze_ms = watch.elapsed_ms();
+}
+
+void TreeSolver::share_analysis(const TreeSolver& other) {
+  impl_->structure = other.impl_->structure;
+  impl_->prepare();
 }
 
 SolveStatus TreeSolver::factor(std::span<const double> values) {
   Impl& impl = *impl_;
   if (impl.engine_.index() == 0) return SolveStatus::NotFactored;
-  if (values.size() != impl.num_values)
-    throw InputError(fmt::format("matrix values: {} given for a pattern of {} entries",
-                                 values.size(), impl.num_values));
+  impl.check_size(values);
   Stopwatch watch;
   try {
-    SolveStatus status = impl.factor_as_asked(values);
+    SolveStatus status = impl.factor_as_asked(values, {});
     if (impl.single() && impl.options.contraction_limit > 0) {
       const bool failed = status != SolveStatus::Ok;
-      impl.report.contraction =
-          failed || impl.symbolic.num_boundary > 0 ? 0 : impl.estimate_contraction(values);
+      const bool boundary = impl.structure->symbolic.num_boundary > 0;
+      impl.report.contraction = failed || boundary ? 0 : impl.estimate_contraction(values);
       if (failed || impl.report.contraction > impl.options.contraction_limit) {
         impl.report.fallback =
             failed ? "the matrix is not positive definite in 32 bits"
                    : fmt::format("a 32-bit solve leaves {:.2g} of the error, more than {:.2g}",
                                  impl.report.contraction, impl.options.contraction_limit);
         impl.make_engine<double>();
-        status = impl.factor_with<double, double>(values);
+        status = impl.factor_with<double, double>(values, {});
       }
     }
     impl.report.factor_ms = watch.elapsed_ms();
@@ -320,6 +378,56 @@ SolveStatus TreeSolver::factor(std::span<const double> values) {
     impl.factored = false;
     return SolveStatus::OutOfMemory;
   }
+}
+
+SolveStatus TreeSolver::refactor_rows(std::span<const double> values, std::span<const int> rows) {
+  Impl& impl = *impl_;
+  impl.check_size(values);
+  if (!impl.can_refactor_parts()) return factor(values);
+  const Structure& structure = *impl.structure;
+  Stopwatch watch;
+  std::vector<char> changed(structure.symbolic.fronts.size(), 0);
+  for (const int row : rows) {
+    if (row < 0 || row >= structure.symbolic.size())
+      throw InputError(fmt::format("rows to refactor: {} is out of range", row));
+    changed[static_cast<std::size_t>(structure.front_of[static_cast<std::size_t>(row)])] = 1;
+  }
+  for (std::size_t f = 0; f < changed.size(); ++f)  // children come before their parents
+    if (const int parent = structure.symbolic.fronts[f].parent; changed[f] && parent >= 0)
+      changed[static_cast<std::size_t>(parent)] = 1;
+  try {
+    const SolveStatus status = impl.factor_as_asked(values, changed);
+    impl.report.factor_ms = watch.elapsed_ms();
+    return status;
+  } catch (const std::bad_alloc&) {
+    impl.factored = false;
+    return SolveStatus::OutOfMemory;
+  }
+}
+
+SolveStatus TreeSolver::solve_with(const double* b, double* x, int columns, TreeSolver& other,
+                                   const double* other_b, double* other_x, int other_columns,
+                                   std::ptrdiff_t row_stride, std::ptrdiff_t other_row_stride) {
+  Impl& ours = *impl_;
+  Impl& theirs = *other.impl_;
+  if (!ours.factored || !theirs.factored) return SolveStatus::NotFactored;
+  const bool together = ours.structure == theirs.structure && ours.single() == theirs.single() &&
+                        columns <= kMaxLanes && other_columns <= kMaxLanes;
+  if (!together) {
+    ours.solve(b, x, columns, row_stride, 1);
+    theirs.solve(other_b, other_x, other_columns, other_row_stride, 1);
+    return SolveStatus::Ok;
+  }
+  const auto run = [&](auto& a, auto& c) {
+    a.sweep.solve_with(a.factor, {b, row_stride, 1, columns}, {x, row_stride, 1, columns}, c.sweep,
+                       c.factor, {other_b, other_row_stride, 1, other_columns},
+                       {other_x, other_row_stride, 1, other_columns});
+  };
+  if (ours.single())
+    run(ours.engine<float>(), theirs.engine<float>());
+  else
+    run(ours.engine<double>(), theirs.engine<double>());
+  return SolveStatus::Ok;
 }
 
 SolveStatus TreeSolver::solve(const double* b, double* x, int columns, std::ptrdiff_t row_stride,
@@ -353,7 +461,7 @@ SolveStatus TreeSolver::expand(const double* boundary, double* x, int columns,
   return SolveStatus::Ok;
 }
 
-int TreeSolver::size() const { return impl_->symbolic.size(); }
+int TreeSolver::size() const { return impl_->structure->symbolic.size(); }
 
 const TreeReport& TreeSolver::report() const { return impl_->report; }
 

@@ -36,6 +36,8 @@ struct TreeOptions {
   /// D^-1) are solved by substitution, not inverted: explicit inverses are not backward stable.
   /// Default by precision: 1e4 and 1e3.
   std::optional<double> condition_limit;
+  /// Keep what refactor_rows() needs between factorisations.
+  bool partial_refactor = false;
   std::optional<Isa> isa;  ///< default: the best one of this processor
   int seed = 1;            ///< of METIS
 };
@@ -82,10 +84,27 @@ class TreeSolver {
   /// singular or not finite).
   [[nodiscard]] SolveStatus factor(std::span<const double> values);
 
+  /// Orders like `other`, whose pattern this matrix has too: nothing is analysed again, and
+  /// solve_with() can take both together. Drops any factor.
+  void share_analysis(const TreeSolver& other);
+
+  /// Factors anew where values have changed since the last factorisation: in the given rows and
+  /// their columns. The same numbers as factor(), which it becomes without
+  /// TreeOptions::partial_refactor. In 32 bits the contraction is not estimated again.
+  /// \throws InputError as factor(), and if a row is out of range.
+  [[nodiscard]] SolveStatus refactor_rows(std::span<const double> values,
+                                          std::span<const int> rows);
+
   /// X = A^-1 B; number c of row i at b[i * row_stride + c * column_stride]. b and x may be the
   /// same. NotFactored: x is not written. With a boundary use condense() and expand().
   [[nodiscard]] SolveStatus solve(const double* b, double* x, int columns,
                                   std::ptrdiff_t row_stride, std::ptrdiff_t column_stride);
+
+  /// Both X = A^-1 B and, with other's matrix, Y = C^-1 D, row-major with the given strides. If the
+  /// two share their analysis and precision they are traversed together, which halves the waits.
+  [[nodiscard]] SolveStatus solve_with(const double* b, double* x, int columns, TreeSolver& other,
+                                       const double* other_b, double* other_x, int other_columns,
+                                       std::ptrdiff_t row_stride, std::ptrdiff_t other_row_stride);
 
   /// Schur complement of the boundary, lower triangle of |boundary|^2, column-major.
   [[nodiscard]] std::span<const double> schur() const;

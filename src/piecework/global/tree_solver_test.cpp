@@ -264,6 +264,64 @@ TEST(TreeSolver, RefactorsOnTheSamePattern) {
   EXPECT_LT(backward_error(other, solve(solver, b), b), 1e-14);
 }
 
+/// A few rows change: the part of the tree that is factored anew must give the bits of the whole.
+TEST(TreeSolver, RefactorsChangedRowsOnly) {
+  const Cloth cloth(150);
+  const Positions b = testing::random_positions(22500, 1, 14);
+  for (const TreeOptions& options :
+       {TreeOptions{.partial_refactor = true},
+        TreeOptions{
+            .precision = Precision::Single, .factor_in_single = true, .partial_refactor = true},
+        TreeOptions{}}) {
+    TreeSolver parts = factored(cloth.K, options);
+    ASSERT_GT(parts.report().subtrees, 4);
+    SparseMatrix K = cloth.K;
+    for (const std::vector<int>& rows : {std::vector{5}, {7000, 7001, 20000}, {}, {0, 22499}}) {
+      for (const int row : rows) K.coeffRef(row, row) *= 50;
+      ASSERT_EQ(parts.refactor_rows(values_of(K), rows), SolveStatus::Ok);
+      TreeSolver whole = factored(K, options);
+      EXPECT_TRUE(solve(parts, b) == solve(whole, b)) << rows.size() << " rows";
+    }
+  }
+  TreeSolver parts = factored(cloth.K, {.partial_refactor = true});
+  SparseMatrix K = cloth.K;
+  K.coeffRef(77, 77) = -1;
+  const std::vector<int> rows{77};
+  EXPECT_EQ(parts.refactor_rows(values_of(K), rows), SolveStatus::NotPositiveDefinite);
+  EXPECT_EQ(parts.refactor_rows(values_of(cloth.K), rows), SolveStatus::Ok) << "all, from scratch";
+  EXPECT_LT(backward_error(cloth.K, solve(parts, b), b), 1e-13);
+  const std::vector<int> outside{22500};
+  EXPECT_THROW((void)parts.refactor_rows(values_of(cloth.K), outside), InputError);
+}
+
+/// K with three right-hand sides and a second matrix of its pattern with one.
+TEST(TreeSolver, TwoMatricesOfOnePatternAreSolvedTogether) {
+  const Cloth cloth(100);
+  SparseMatrix other = cloth.K;
+  other.diagonal() *= 2;
+  const Positions b = testing::random_positions(10000, 1, 15);
+  const Eigen::VectorXd d = b.col(1);
+  for (const Precision precision : {Precision::Double, Precision::Single}) {
+    TreeSolver K = factored(cloth.K, {.precision = precision});
+    TreeSolver N({.precision = precision});
+    N.share_analysis(K);
+    EXPECT_EQ(N.report().analyze_ms, 0);
+    ASSERT_EQ(N.factor(values_of(other)), SolveStatus::Ok);
+    Positions x(10000, 3);
+    Eigen::VectorXd y(10000);
+    ASSERT_EQ(K.solve_with(b.data(), x.data(), 3, N, d.data(), y.data(), 1, 3, 1), SolveStatus::Ok);
+    EXPECT_TRUE(x == solve(K, b));
+    Eigen::VectorXd alone(10000);
+    ASSERT_EQ(N.solve(d.data(), alone.data(), 1, 1, 1), SolveStatus::Ok);
+    EXPECT_TRUE(y == alone);
+    EXPECT_LT((other * y - d).norm() / d.norm(), precision == Precision::Double ? 1e-10 : 1e-2);
+  }
+  TreeSolver K = factored(cloth.K);
+  TreeSolver none;
+  EXPECT_EQ(K.solve_with(b.data(), nullptr, 3, none, d.data(), nullptr, 1, 3, 1),
+            SolveStatus::NotFactored);
+}
+
 TEST(TreeSolver, WhatIsNotPositiveDefiniteIsAStatus) {
   const Cloth cloth(20);
   const Positions b = Positions::Constant(400, 3, 42);

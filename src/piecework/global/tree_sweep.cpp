@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
 
 namespace piecework::global {
@@ -295,54 +296,107 @@ void TreeSweep<T>::backward_top(const TreeFactor<T>& factor, int f, const Vector
 }
 
 template <class T>
-template <int kLanes>
-void TreeSweep<T>::forward(const TreeFactor<T>& factor, const VectorView<const double>& b) {
-  parallel_for(
-      plan_.tasks.size(),
-      [&](std::size_t t) {
-        for (const int s : plan_.tasks[t])
-          forward_subtree<kLanes>(factor, plan_.subtrees[static_cast<std::size_t>(s)], b);
-      },
-      1);
-  for (const auto& level : plan_.levels)
-    parallel_for(
-        level.size(), [&](std::size_t i) { forward_top<kLanes>(factor, level[i], b); }, 1);
+void TreeSweep<T>::forward_task(const TreeFactor<T>& factor, std::size_t task,
+                                const VectorView<const double>& b) {
+  for (const int s : plan_.tasks[task]) {
+    const Subtree& subtree = plan_.subtrees[static_cast<std::size_t>(s)];
+    if (b.columns == 1)
+      forward_subtree<1>(factor, subtree, b);
+    else
+      forward_subtree<kMaxLanes>(factor, subtree, b);
+  }
 }
 
 template <class T>
-template <int kLanes>
+void TreeSweep<T>::backward_task(const TreeFactor<T>& factor, std::size_t task,
+                                 const VectorView<double>& x) {
+  for (std::size_t s = plan_.tasks[task].size(); s-- > 0;) {
+    const Subtree& subtree = plan_.subtrees[static_cast<std::size_t>(plan_.tasks[task][s])];
+    if (x.columns == 1)
+      backward_subtree<1>(factor, subtree, x);
+    else
+      backward_subtree<kMaxLanes>(factor, subtree, x);
+  }
+}
+
+template <class T>
+void TreeSweep<T>::forward_front(const TreeFactor<T>& factor, int f,
+                                 const VectorView<const double>& b) {
+  if (b.columns == 1)
+    forward_top<1>(factor, f, b);
+  else
+    forward_top<kMaxLanes>(factor, f, b);
+}
+
+template <class T>
+void TreeSweep<T>::backward_front(const TreeFactor<T>& factor, int f, const VectorView<double>& x) {
+  if (x.columns == 1)
+    backward_top<1>(factor, f, x);
+  else
+    backward_top<kMaxLanes>(factor, f, x);
+}
+
+template <class T>
+void TreeSweep<T>::forward(const TreeFactor<T>& factor, const VectorView<const double>& b) {
+  parallel_for(
+      plan_.tasks.size(), [&](std::size_t t) { forward_task(factor, t, b); }, 1);
+  for (const auto& level : plan_.levels)
+    parallel_for(
+        level.size(), [&](std::size_t i) { forward_front(factor, level[i], b); }, 1);
+}
+
+template <class T>
 void TreeSweep<T>::backward(const TreeFactor<T>& factor, const VectorView<double>& x) {
   for (std::size_t level = plan_.levels.size(); level-- > 0;)
     parallel_for(
         plan_.levels[level].size(),
-        [&](std::size_t i) { backward_top<kLanes>(factor, plan_.levels[level][i], x); }, 1);
+        [&](std::size_t i) { backward_front(factor, plan_.levels[level][i], x); }, 1);
   // What the forward sweep touched last is in the caches still.
+  const std::size_t last = plan_.tasks.size() - 1;
   parallel_for(
-      plan_.tasks.size(),
-      [&](std::size_t i) {
-        const auto& task = plan_.tasks[plan_.tasks.size() - 1 - i];
-        for (std::size_t s = task.size(); s-- > 0;)
-          backward_subtree<kLanes>(factor, plan_.subtrees[static_cast<std::size_t>(task[s])], x);
-      },
-      1);
+      plan_.tasks.size(), [&](std::size_t t) { backward_task(factor, last - t, x); }, 1);
 }
 
 template <class T>
 void TreeSweep<T>::solve(const TreeFactor<T>& factor, const VectorView<const double>& b,
                          const VectorView<double>& x) {
-  if (b.columns == 1) {
-    forward<1>(factor, b);
-    backward<1>(factor, x);
-  } else {
-    forward<kMaxLanes>(factor, b);
-    backward<kMaxLanes>(factor, x);
-  }
+  forward(factor, b);
+  backward(factor, x);
+}
+
+template <class T>
+void TreeSweep<T>::solve_with(const TreeFactor<T>& factor, const VectorView<const double>& b,
+                              const VectorView<double>& x, TreeSweep& other,
+                              const TreeFactor<T>& other_factor,
+                              const VectorView<const double>& other_b,
+                              const VectorView<double>& other_x) {
+  PIECEWORK_ASSERT(other.plan_.factor_numbers == plan_.factor_numbers);
+  const auto both = [](std::size_t count, const auto& ours, const auto& theirs) {
+    parallel_for(
+        2 * count, [&](std::size_t i) { i % 2 == 0 ? ours(i / 2) : theirs(i / 2); }, 1);
+  };
+  both(
+      plan_.tasks.size(), [&](std::size_t t) { forward_task(factor, t, b); },
+      [&](std::size_t t) { other.forward_task(other_factor, t, other_b); });
+  for (const auto& level : plan_.levels)
+    both(
+        level.size(), [&](std::size_t i) { forward_front(factor, level[i], b); },
+        [&](std::size_t i) { other.forward_front(other_factor, level[i], other_b); });
+  for (std::size_t l = plan_.levels.size(); l-- > 0;)
+    both(
+        plan_.levels[l].size(),
+        [&](std::size_t i) { backward_front(factor, plan_.levels[l][i], x); },
+        [&](std::size_t i) { other.backward_front(other_factor, plan_.levels[l][i], other_x); });
+  const std::size_t last = plan_.tasks.size() - 1;
+  both(
+      plan_.tasks.size(), [&](std::size_t t) { backward_task(factor, last - t, x); },
+      [&](std::size_t t) { other.backward_task(other_factor, last - t, other_x); });
 }
 
 template <class T>
 void TreeSweep<T>::condense(const TreeFactor<T>& factor, const VectorView<const double>& b,
                             double* boundary) {
-  forward<kMaxLanes>(factor, b);
+  forward(factor, b);
   if (plan_.boundary_front < 0) return;
   const Lanes<T> vector = vector_of(plan_.boundary_front);
   const int rows = symbolic_.num_boundary;
@@ -362,7 +416,7 @@ void TreeSweep<T>::expand(const TreeFactor<T>& factor, const double* boundary,
         vector.data[r + c * vector.stride] =
             c < x.columns ? static_cast<T>(boundary[c * rows + r]) : T(0);
   }
-  backward<kMaxLanes>(factor, x);
+  backward(factor, x);
 }
 
 template class TreeSweep<float>;

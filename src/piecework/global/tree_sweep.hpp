@@ -28,6 +28,12 @@ class TreeSweep {
   void solve(const TreeFactor<T>& factor, const VectorView<const double>& b,
              const VectorView<double>& x);
 
+  /// Two matrices of one pattern at once: half the number of waits of two solves.
+  /// \pre other has an equal plan.
+  void solve_with(const TreeFactor<T>& factor, const VectorView<const double>& b,
+                  const VectorView<double>& x, TreeSweep& other, const TreeFactor<T>& other_factor,
+                  const VectorView<const double>& other_b, const VectorView<double>& other_x);
+
   /// First half: eliminates; adds to `boundary` (num_boundary x columns, column-major) what that
   /// leaves there.
   void condense(const TreeFactor<T>& factor, const VectorView<const double>& b, double* boundary);
@@ -36,10 +42,13 @@ class TreeSweep {
   void expand(const TreeFactor<T>& factor, const double* boundary, const VectorView<double>& x);
 
  private:
-  template <int kLanes>
   void forward(const TreeFactor<T>& factor, const VectorView<const double>& b);
-  template <int kLanes>
   void backward(const TreeFactor<T>& factor, const VectorView<double>& x);
+  void forward_task(const TreeFactor<T>& factor, std::size_t task,
+                    const VectorView<const double>& b);
+  void backward_task(const TreeFactor<T>& factor, std::size_t task, const VectorView<double>& x);
+  void forward_front(const TreeFactor<T>& factor, int f, const VectorView<const double>& b);
+  void backward_front(const TreeFactor<T>& factor, int f, const VectorView<double>& x);
   template <int kLanes>
   void load(int first_column, int count, const VectorView<const double>& b,
             const Lanes<T>& to) const;
