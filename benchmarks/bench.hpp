@@ -26,6 +26,14 @@ class Registration {
   explicit Registration(void (*function)());
 };
 
+/// Another thing that a driver can do: with the flag `name` as its last argument the
+/// driver runs `function` instead of the benchmarks and exits with what that returns. To be a
+/// static object of a driver.
+class Command {
+ public:
+  Command(const char* name, const char* help, int (*function)());
+};
+
 /// Ends a benchmark because its result is invalid; the program then exits with 5.
 /// Leave the benchmark's function after the call.
 void fail(benchmark::State& state, const std::string& reason);

@@ -28,6 +28,7 @@
 
 #include "bench.hpp"
 #include "interleaved.hpp"
+#include "predict.hpp"
 
 namespace piecework::bench {
 namespace {
@@ -473,6 +474,87 @@ void register_size(std::int64_t n) {
   add("tree_f64", tree_f64, {n}, {1}, {1, 2}, false);
   add("tree_f32", tree_f32, {n}, {1}, {1, 2}, false);
 }
+
+/// Median time of one parallel loop of nothing, ms.
+double barrier_ms(ThreadPool& pool) {
+  std::vector<double> times;
+  for (int k = 0; k < 500; ++k)
+    pool.run([&] {
+      const double start = ProcessClock::wall();
+      parallel_for(
+          static_cast<std::size_t>(pool.threads()), [](std::size_t) {}, 1);
+      times.push_back(1e3 * (ProcessClock::wall() - start));
+    });
+  return median_interval(std::move(times)).median;
+}
+
+/// Median over calls in a row, ms.
+double median_ms(ThreadPool& pool, int count, const std::function<void()>& call) {
+  std::vector<double> times;
+  pool.run(call);
+  for (int k = 0; k < count; ++k) {
+    const double start = ProcessClock::wall();
+    pool.run(call);
+    times.push_back(1e3 * (ProcessClock::wall() - start));
+  }
+  return median_interval(std::move(times)).median;
+}
+
+/// Predictions for one size and precision, beside what this machine can measure.
+void print_predictions(std::int64_t n, const global::TreeOptions& options) {
+  constexpr int kRepeats = 11;
+  Problem& p = problem(n, true);
+  const int cores = available_threads();
+  ThreadPool one(1);
+  ThreadPool all(cores);
+  global::TreeSolver solver;
+  Positions x = p.b;
+  const auto solve = [&] { (void)solver.solve(p.b.data(), x.data(), 3, 3, 1); };
+  all.run([&] { solver = make_tree(p, {n, 1, cores, true}, options); });
+  std::vector<global::TreeSchedule> schedules;
+  one.run([&] {
+    for (int k = 0; k < kRepeats; ++k) schedules.push_back(solver.profile(p.b.data(), x.data()));
+  });
+  const global::TreeSchedule schedule = median_schedule(schedules);
+  const double cholmod = median_ms(one, kRepeats, [&] { p.solve_with_cholmod(); });
+  const double read = median_ms(all, kRepeats, [&] { keep(solver.read_factor()); });
+  const double bandwidth = static_cast<double>(solver.report().bytes) / read;
+  const double barrier = barrier_ms(all);
+  fmt::print(
+      "\n**{} vertices, {}-bit factor**: CHOLMOD on 1 thread {:.3g} ms; all {} cores read "
+      "the factor at {:.3g} GB/s; a barrier takes {:.2g} us\n\n",
+      n, options.precision == global::Precision::Single ? 32 : 64, cholmod, cores, bandwidth / 1e6,
+      1e3 * barrier);
+  fmt::print(
+      "| cores | measured (ms) | predicted, this memory (ms) | ratio | "
+      "predicted, memory grows with cores (ms) | ratio |\n"
+      "| ---: | ---: | ---: | ---: | ---: | ---: |\n");
+  for (int count = 1; count <= 128; count *= 2) {
+    std::string measured = "-";
+    if (count <= cores) {
+      ThreadPool pool(count);
+      measured = fmt::format("{:.3g}", median_ms(pool, kRepeats, solve));
+    }
+    const double here = predicted_ms(schedule, count, {barrier, bandwidth});
+    const double free = predicted_ms(schedule, count, {barrier, 0});
+    fmt::print("| {} | {} | {:.3g} | {:.3g} | {:.3g} | {:.3g} |\n", count, measured, here,
+               cholmod / here, free, cholmod / free);
+  }
+}
+
+int predict() {
+  fmt::print(
+      "Predicted times of one global solve with three right-hand sides: a model of the task\n"
+      "graph with times of each part measured on one core, not a measurement. `ratio` is\n"
+      "CHOLMOD on 1 thread over the prediction.\n");
+  for (const std::int64_t n : {19881, 60025, 199809})
+    for (const global::TreeOptions& options : {global::TreeOptions{}, kSingle})
+      if (!quick() || n == 19881) print_predictions(n, options);
+  return 0;
+}
+
+const Command predict_command("--predict", "how solves would run on 1 to 128 cores: a model",
+                              predict);
 
 const Registration registration([] {
   for (const std::int64_t n : {19881, 60025, 199809, 1000000})

@@ -35,6 +35,17 @@ std::vector<void (*)()>& registrations() {
   return functions;
 }
 
+struct NamedCommand {
+  const char* flag;
+  const char* help;
+  int (*function)();
+};
+
+std::vector<NamedCommand>& commands() {
+  static std::vector<NamedCommand> all;
+  return all;
+}
+
 /// Passes everything on to the reporter that --benchmark_format names, and counts failures.
 class FailureCounter : public benchmark::BenchmarkReporter {
  public:
@@ -109,13 +120,18 @@ std::vector<char*> read_own_flags(int argc, char** argv) {
 void print_help() {
   fmt::print(
       "Flags of Piecework's benchmarks:\n"
-      "          [--quick]  small sizes, to see that the driver works; times mean nothing\n"
-      "Flags of Google Benchmark:\n");
+      "          [--quick]  small sizes, to see that the driver works; times mean nothing\n");
+  for (const NamedCommand& command : commands())
+    fmt::print("          [{}]  {}\n", command.flag, command.help);
+  fmt::print("Flags of Google Benchmark:\n");
   benchmark::PrintDefaultHelp();
 }
 
 int run(int argc, char** argv) {
   std::vector<char*> arguments = read_own_flags(argc, argv);
+  for (const NamedCommand& command : commands())
+    if (arguments.size() > 1 && !std::strcmp(arguments.back(), command.flag))
+      return command.function();
   int count = static_cast<int>(arguments.size());
   arguments.push_back(nullptr);
   benchmark::Initialize(&count, arguments.data(), print_help);
@@ -144,6 +160,10 @@ int run(int argc, char** argv) {
 bool quick() { return quick_mode; }
 
 Registration::Registration(void (*function)()) { registrations().push_back(function); }
+
+Command::Command(const char* name, const char* help, int (*function)()) {
+  commands().push_back({name, help, function});
+}
 
 void fail(benchmark::State& state, const std::string& reason) {
   state.SkipWithError(reason.c_str());

@@ -461,6 +461,15 @@ SolveStatus TreeSolver::expand(const double* boundary, double* x, int columns,
   return SolveStatus::Ok;
 }
 
+TreeSchedule TreeSolver::profile(const double* b, double* x) {
+  PIECEWORK_ASSERT(impl_->factored);
+  TreeSchedule schedule;
+  impl_->with_engine([&](auto& engine) {
+    engine.sweep.profile(engine.factor, {b, 3, 1, 3}, {x, 3, 1, 3}, schedule);
+  });
+  return schedule;
+}
+
 int TreeSolver::size() const { return impl_->structure->symbolic.size(); }
 
 const TreeReport& TreeSolver::report() const { return impl_->report; }

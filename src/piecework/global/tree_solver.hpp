@@ -14,6 +14,7 @@
 #include <piecework/global/isa.hpp>
 #include <piecework/global/pattern.hpp>
 #include <piecework/global/status.hpp>
+#include <piecework/global/tree_schedule.hpp>
 
 namespace piecework::global {
 
@@ -117,6 +118,10 @@ class TreeSolver {
   /// Second half, after condense(): given the boundary's x, all other rows of x.
   [[nodiscard]] SolveStatus expand(const double* boundary, double* x, int columns,
                                    std::ptrdiff_t row_stride, std::ptrdiff_t column_stride);
+
+  /// Times of the parts of a solve with three right-hand sides, on the calling thread.
+  /// \pre factored, no boundary; b and x row-major, |V| x 3.
+  [[nodiscard]] TreeSchedule profile(const double* b, double* x);
 
   [[nodiscard]] int size() const;
   [[nodiscard]] const TreeReport& report() const;

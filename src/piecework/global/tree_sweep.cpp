@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include <piecework/core/clock.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
 
@@ -129,15 +130,13 @@ void TreeSweep<T>::forward_panel(const TreeFactor<T>& factor, std::size_t p, con
     const StoredTriangle<T> triangle(view.own, panel.cols, kernels_.layout);
     for (int l = 0; l < kLanes; ++l) triangle.solve(own.data + l * own.stride);
   }
-  const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(panel.rows) * panel.cols;
-  if (!tiled || size < 2 * kTileNumbers) {
+  const int tile = tiled ? forward_tile(p) : 0;
+  if (tile == 0) {
     sweeps<kLanes>().forward(view, own, below);
     return;
   }
-  const int chunk = kernels_.layout.chunk_rows;
-  const int tile = static_cast<int>(kTileNumbers / (panel.cols * chunk) + 1) * chunk;
   parallel_for(
-      static_cast<std::size_t>((panel.rows + tile - 1) / tile),
+      static_cast<std::size_t>(num_forward_tiles(p)),
       [&](std::size_t i) {
         PanelView<T> part = view;
         part.first_row = static_cast<int>(i) * tile;
@@ -157,14 +156,12 @@ void TreeSweep<T>::backward_panel(const TreeFactor<T>& factor, std::size_t p, co
   const PanelView<T> view{numbers + panel.own, numbers + panel.below,  panel.cols, panel.rows, 0,
                           panel.rows,          !factor.substituted[p], false};
   const int strips = kernels_.layout.num_strips(panel.cols);
-  const std::ptrdiff_t strip_size =
-      static_cast<std::ptrdiff_t>(panel.rows + panel.cols) * kernels_.layout.strip_cols;
-  if (!tiled || strip_size * strips < 2 * kTileNumbers) {
+  const int tile = tiled ? backward_tile(p) : 0;
+  if (tile == 0) {
     sweeps<kLanes>().backward(view, 0, strips, own, below, out);
   } else {
-    const int tile = static_cast<int>(kTileNumbers / strip_size) + 1;
     parallel_for(
-        static_cast<std::size_t>((strips + tile - 1) / tile),
+        static_cast<std::size_t>(num_backward_tiles(p)),
         [&](std::size_t i) {
           const int first = static_cast<int>(i) * tile;
           sweeps<kLanes>().backward(view, first, std::min(strips, first + tile), own, below, out);
@@ -391,6 +388,95 @@ void TreeSweep<T>::solve_with(const TreeFactor<T>& factor, const VectorView<cons
   both(
       plan_.tasks.size(), [&](std::size_t t) { backward_task(factor, last - t, x); },
       [&](std::size_t t) { other.backward_task(other_factor, last - t, other_x); });
+}
+
+template <class T>
+void TreeSweep<T>::profile(const TreeFactor<T>& factor, const VectorView<const double>& b,
+                           const VectorView<double>& x, TreeSchedule& schedule) {
+  schedule = {};
+  schedule.tasks.resize(plan_.tasks.size());
+  const auto add_bytes = [&](int f, TreeSchedule::Part& part) {
+    for (int k = 0; k < plan(f).num_panels; ++k) {
+      const Panel& panel = plan_.panels[plan(f).first_panel + static_cast<std::size_t>(k)];
+      const double below = static_cast<double>(panel.rows) * panel.cols * sizeof(T);
+      part.forward_bytes += below;
+      part.backward_bytes += below + static_cast<double>(panel.cols) * panel.cols * sizeof(T);
+    }
+  };
+  Stopwatch watch;
+  for (std::size_t t = 0; t < plan_.tasks.size(); ++t) {
+    watch.lap();
+    forward_task(factor, t, b);
+    schedule.tasks[t].forward_ms = watch.lap();
+    for (const int s : plan_.tasks[t]) {
+      const Subtree& subtree = plan_.subtrees[static_cast<std::size_t>(s)];
+      for (int f = subtree.first_front; f <= subtree.last_front; ++f)
+        add_bytes(f, schedule.tasks[t]);
+    }
+  }
+  for (std::size_t level = 0; level < plan_.levels.size(); ++level)
+    for (const int f : plan_.levels[level]) {
+      TreeSchedule::Front front;
+      front.level = static_cast<int>(level);
+      front.panels = plan(f).num_panels;
+      for (int k = 0; k < front.panels; ++k) {
+        const std::size_t p = plan(f).first_panel + static_cast<std::size_t>(k);
+        front.forward_tiles = std::max(front.forward_tiles, num_forward_tiles(p));
+        front.backward_tiles = std::max(front.backward_tiles, num_backward_tiles(p));
+      }
+      add_bytes(f, front);
+      watch.lap();
+      forward_front(factor, f, b);
+      front.forward_ms = watch.lap();
+      schedule.fronts.push_back(front);
+    }
+  for (std::size_t i = schedule.fronts.size(); i-- > 0;) {
+    const auto level = static_cast<std::size_t>(schedule.fronts[i].level);
+    std::size_t first = 0;
+    for (std::size_t l = 0; l < level; ++l) first += plan_.levels[l].size();
+    watch.lap();
+    backward_front(factor, plan_.levels[level][i - first], x);
+    schedule.fronts[i].backward_ms = watch.lap();
+  }
+  for (std::size_t t = plan_.tasks.size(); t-- > 0;) {
+    watch.lap();
+    backward_task(factor, t, x);
+    schedule.tasks[t].backward_ms = watch.lap();
+  }
+}
+
+/// Rows of a tile, or 0 if the panel is too small to be divided.
+template <class T>
+int TreeSweep<T>::forward_tile(std::size_t p) const {
+  const Panel& panel = plan_.panels[p];
+  const int chunk = kernels_.layout.chunk_rows;
+  const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(panel.rows) * panel.cols;
+  return size < 2 * kTileNumbers
+             ? 0
+             : static_cast<int>(kTileNumbers / (panel.cols * chunk) + 1) * chunk;
+}
+
+/// Strips of a tile, or 0 if the panel is too small to be divided.
+template <class T>
+int TreeSweep<T>::backward_tile(std::size_t p) const {
+  const Panel& panel = plan_.panels[p];
+  const std::ptrdiff_t strip =
+      static_cast<std::ptrdiff_t>(panel.rows + panel.cols) * kernels_.layout.strip_cols;
+  return strip * kernels_.layout.num_strips(panel.cols) < 2 * kTileNumbers
+             ? 0
+             : static_cast<int>(kTileNumbers / strip) + 1;
+}
+
+template <class T>
+int TreeSweep<T>::num_forward_tiles(std::size_t p) const {
+  const int tile = forward_tile(p);
+  return tile == 0 ? 1 : (plan_.panels[p].rows + tile - 1) / tile;
+}
+
+template <class T>
+int TreeSweep<T>::num_backward_tiles(std::size_t p) const {
+  const int tile = backward_tile(p);
+  return tile == 0 ? 1 : (kernels_.layout.num_strips(plan_.panels[p].cols) + tile - 1) / tile;
 }
 
 template <class T>

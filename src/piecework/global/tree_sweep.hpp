@@ -2,6 +2,8 @@
 
 // Forward and backward sweeps over a factored tree. Private to the global module.
 
+#include <piecework/global/tree_schedule.hpp>
+
 #include "tree_factor.hpp"
 
 namespace piecework::global {
@@ -33,6 +35,10 @@ class TreeSweep {
   void solve_with(const TreeFactor<T>& factor, const VectorView<const double>& b,
                   const VectorView<double>& x, TreeSweep& other, const TreeFactor<T>& other_factor,
                   const VectorView<const double>& other_b, const VectorView<double>& other_x);
+
+  /// Solves on the calling thread and writes the time of each task and front above the subtrees.
+  void profile(const TreeFactor<T>& factor, const VectorView<const double>& b,
+               const VectorView<double>& x, TreeSchedule& schedule);
 
   /// First half: eliminates; adds to `boundary` (num_boundary x columns, column-major) what that
   /// leaves there.
@@ -72,6 +78,11 @@ class TreeSweep {
   template <int kLanes>
   void backward_panel(const TreeFactor<T>& factor, std::size_t p, const Lanes<T>& own,
                       const Lanes<T>& below, const Lanes<T>& out, bool tiled) const;
+
+  [[nodiscard]] int forward_tile(std::size_t p) const;
+  [[nodiscard]] int backward_tile(std::size_t p) const;
+  [[nodiscard]] int num_forward_tiles(std::size_t p) const;
+  [[nodiscard]] int num_backward_tiles(std::size_t p) const;
 
   template <int kLanes>
   [[nodiscard]] const SweepKernels<T>& sweeps() const {
