@@ -74,8 +74,7 @@ TreeSchedule median_schedule(const std::vector<TreeSchedule>& schedules) {
     for (const auto& schedule : schedules) times.push_back(part_of(schedule).*time);
     return median_interval(std::move(times)).median;
   };
-  for (const Time time :
-       {&TreeSchedule::Part::forward_ms, &TreeSchedule::Part::backward_ms}) {
+  for (const Time time : {&TreeSchedule::Part::forward_ms, &TreeSchedule::Part::backward_ms}) {
     for (std::size_t i = 0; i < result.tasks.size(); ++i)
       result.tasks[i].*time =
           median([&](const auto& s) -> const TreeSchedule::Part& { return s.tasks[i]; }, time);

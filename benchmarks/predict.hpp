@@ -10,8 +10,8 @@ namespace piecework::bench {
 
 /// What the model knows of a machine.
 struct Machine {
-  double barrier_ms = 0;    ///< one parallel loop without work, all threads
-  double bandwidth = 0;     ///< bytes per ms that all cores together can read; 0: no limit
+  double barrier_ms = 0;  ///< one parallel loop without work, all threads
+  double bandwidth = 0;   ///< bytes per ms that all cores together can read; 0: no limit
 };
 
 /// Tasks go to the least busy core, the longest first; the fronts of a level share the cores, none

@@ -52,10 +52,10 @@ struct Subtree {
 struct PlanOptions {
   // Chosen by measurement: narrow panels store no more numbers (a triangle of B replaces a square
   // of D^-1), and above the subtrees each panel is a step that all threads wait for.
-  int panel_columns = 32;        ///< inside subtrees
-  int top_panel_columns = 64;    ///< above them
-  double subtree_numbers = 4e5;  ///< factor numbers of a subtree at most
-  double task_numbers = 1e5;     ///< small subtrees share tasks of about this size
+  int panel_columns = 32;          ///< inside subtrees
+  int top_panel_columns = 64;      ///< above them
+  double subtree_numbers = 1.2e5;  ///< factor numbers of a subtree at most
+  double task_numbers = 6e4;       ///< small subtrees share tasks of about this size
 };
 
 struct TreePlan {

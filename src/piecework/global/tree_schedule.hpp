@@ -12,14 +12,14 @@ struct TreeSchedule {
   struct Part {
     double forward_ms = 0;
     double backward_ms = 0;
-    double forward_bytes = 0;   ///< of the factor that are read
+    double forward_bytes = 0;  ///< of the factor that are read
     double backward_bytes = 0;
   };
   /// A front above the subtrees: its panels follow each other, each divided into tiles.
   struct Front : Part {
     int level = 0;
     int panels = 0;
-    int forward_tiles = 1;   ///< of its largest panel
+    int forward_tiles = 1;  ///< of its largest panel
     int backward_tiles = 1;
   };
   std::vector<Part> tasks;
