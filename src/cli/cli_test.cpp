@@ -90,7 +90,7 @@ TEST_F(Cli, HelpStartsWithExamplesAndVersionIsPrinted) {
   EXPECT_EQ(help.code, 0);
   EXPECT_LT(help.out.find("Examples:"), help.out.find("Options:"));
   for (const char* command :
-       {"run", "render", "partition", "check", "env", "schema", "doctor", "scenes"}) {
+       {"run", "render", "partition", "tune", "check", "env", "schema", "doctor", "scenes"}) {
     EXPECT_NE(help.out.find(command), std::string::npos) << command;
     EXPECT_EQ(call(std::string(command) + " --help").code, 0) << command;
   }
@@ -284,6 +284,60 @@ TEST_F(Cli, CheckSaysWhatIsOnAndRunsNothing) {
   EXPECT_NE(result.out.find("sound"), std::string::npos);
   EXPECT_NE(result.out.find("wind         -"), std::string::npos) << result.out;
   EXPECT_NE(result.out.find("border (44)"), std::string::npos) << result.out;
+}
+
+TEST_F(Cli, TuneProposesForASimulatedHybridProcessor) {
+  write_file_atomically(folder_ / "hybrid.json", R"({"kinds": [
+      {"name": "performance", "cores": 8, "speed": 1.0},
+      {"name": "efficient", "cores": 8, "speed": 0.55}]})");
+  const std::string path = scene(160, 2);  // 25600 vertices
+  const std::string command = "tune " + path + " --topology " + dir("hybrid.json") + " -o ";
+  const Result result = call(command + dir("tuned.json"));
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("chosen: 16 domains, 8 x 1, 8 x 0.55 sizes"), std::string::npos)
+      << result.out;
+  EXPECT_EQ(call(command + dir("again.json")).out.find("ms,"), std::string::npos);
+  EXPECT_EQ(read_file(dir("tuned.json")), read_file(dir("again.json"))) << "nothing is measured";
+  const auto json = nlohmann::json::parse(read_file(dir("tuned.json")));
+  const auto weights = json.at("solver").at("domain_weights").get<std::vector<double>>();
+  ASSERT_EQ(weights.size(), 16U);
+  EXPECT_EQ(json.at("solver").at("domains"), 16);
+  for (std::size_t k = 0; k < 8; ++k) EXPECT_DOUBLE_EQ(weights[8 + k] / weights[k], 0.55);
+  const Result check = call("check " + dir("tuned.json"));
+  EXPECT_EQ(check.code, 0) << check.err;
+  EXPECT_NE(check.out.find("domains       16"), std::string::npos) << check.out;
+}
+
+TEST_F(Cli, TuneMeasuresThisMachineAndKeepsTheScene) {
+  const std::string path = scene(50, 2);
+  const std::string before = read_file(path);
+  const Result said = call("tune " + path + " --threads 2");
+  ASSERT_EQ(said.code, 0) << said.err;
+  EXPECT_NE(said.out.find("now: 4 | equal |"), std::string::npos) << said.out;
+  EXPECT_NE(said.out.find("chosen: "), std::string::npos) << said.out;
+  const Result refused = call("tune " + path + " --threads 2 -o " + path);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("--overwrite"), std::string::npos) << refused.err;
+  EXPECT_EQ(read_file(path), before);
+  EXPECT_EQ(call("tune " + path + " --threads 2 --overwrite -o " + path).code, 0);
+  EXPECT_NE(read_file(path), before);
+  EXPECT_EQ(call("run " + path + " --no-images --expect -o " + dir("tuned")).code, 0);
+}
+
+TEST_F(Cli, TuneFaultsHaveTheirExitCodes) {
+  const std::string path = scene();
+  EXPECT_EQ(call("tune").code, 2);
+  EXPECT_EQ(call("tune " + path + " --threads 0").code, 2);
+  EXPECT_EQ(call("tune /nowhere.json").code, 3);
+  EXPECT_EQ(call("tune " + path + " --topology /nowhere.json").code, 3);
+  write_file_atomically(folder_ / "t.json",
+                        R"({"kinds": [{"name": "a", "cores": 0, "speed": 1}]})");
+  const Result bad = call("tune " + path + " --topology " + dir("t.json"));
+  EXPECT_EQ(bad.code, 3);
+  EXPECT_NE(bad.err.find("t.json: /kinds/0/cores: 0 is no count"), std::string::npos) << bad.err;
+  write_file_atomically(folder_ / "t.json",
+                        R"({"kinds": [{"name": "a", "cores": 2, "speed": 1}]})");
+  EXPECT_EQ(call("tune " + path + " --topology " + dir("t.json") + " -o /nowhere/x.json").code, 4);
 }
 
 TEST_F(Cli, SchemaEnvAndScenesAreMachineReadable) {

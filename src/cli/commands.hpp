@@ -26,6 +26,7 @@ using Action = std::function<int()>;
 void add_run(CLI::App& program, Action& action, const Verbosity& verbosity);
 void add_render(CLI::App& program, Action& action, const Verbosity& verbosity);
 void add_partition(CLI::App& program, Action& action, const Verbosity& verbosity);
+void add_tune(CLI::App& program, Action& action, const Verbosity& verbosity);
 void add_check(CLI::App& program, Action& action);
 void add_env(CLI::App& program, Action& action);
 void add_schema(CLI::App& program, Action& action);

@@ -27,6 +27,7 @@ constexpr const char* kExamples =
     "  piecework render out/cloth --color strain             draw a finished run again\n"
     "  piecework partition garment.obj -k 32 -o domains.png  cut a mesh into domains\n"
     "  piecework check scene.json                            what is on, and whether it is sound\n"
+    "  piecework tune scene.json -o tuned.json               domains for this processor\n"
     "  piecework scenes                                      scenes that come along\n";
 
 /// Help that starts with examples.
@@ -58,6 +59,7 @@ int run_program(int argc, char** argv) {
   add_run(program, action, verbosity);
   add_render(program, action, verbosity);
   add_partition(program, action, verbosity);
+  add_tune(program, action, verbosity);
   add_check(program, action);
   add_env(program, action);
   add_schema(program, action);

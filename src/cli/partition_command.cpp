@@ -65,7 +65,10 @@ void print_text(const runner::World& world) {
 int partition(const PartitionArguments& arguments, bool k_given, const Verbosity& verbosity) {
   scene::Scene scene = is_scene(arguments.input) ? scene::load_scene(arguments.input)
                                                  : mesh_scene(arguments.input, arguments.mesh);
-  if (k_given) scene.solver.domains = arguments.mesh.domains;
+  if (k_given) {
+    scene.solver.domains = arguments.mesh.domains;
+    scene.solver.domain_weights.clear();  // they were for another number
+  }
   const auto world = runner::build_world(scene);
   for (const std::string& note : world->notes)
     if (!verbosity.quiet) say("note: {}\n", note);

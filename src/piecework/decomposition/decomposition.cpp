@@ -97,6 +97,52 @@ std::vector<Piece> connected_components(const TriangleGraph& graph) {
   return pieces;
 }
 
+/// Sums of the first 0, 1, ... weights.
+std::vector<double> prefix_sums(std::span<const double> weights) {
+  std::vector<double> sums(weights.size() + 1, 0.0);
+  std::partial_sum(weights.begin(), weights.end(), sums.begin() + 1);
+  return sums;
+}
+
+/// The number of domains from `first` on, `low` to `high` of them, whose weight is closest to
+/// `target`; the fewer of two that are as close.
+int count_with_weight(std::span<const double> sums, int first, int low, int high, double target) {
+  const auto miss = [&](int count) {
+    return std::abs(sums[static_cast<std::size_t>(first) + static_cast<std::size_t>(count)] -
+                    sums[static_cast<std::size_t>(first)] - target);
+  };
+  int best = low;
+  for (int count = low + 1; count <= high; ++count)
+    if (miss(count) < miss(best)) best = count;
+  return best;
+}
+
+/// Gives every piece, in order, the next domains: those whose weight is closest to its own.
+void share_weighted_domains(std::vector<Piece>& pieces, std::span<const double> weights) {
+  const std::vector<double> sums = prefix_sums(weights);
+  double work = 0;
+  std::int64_t room = 0;  // domains that the pieces not yet served can hold
+  for (const Piece& piece : pieces) {
+    work += static_cast<double>(piece.weight);
+    room += static_cast<std::int64_t>(piece.triangles.size());
+  }
+  int first = 0;
+  double done = 0;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    Piece& piece = pieces[p];
+    const auto size = static_cast<std::int64_t>(piece.triangles.size());
+    const auto left = static_cast<std::int64_t>(weights.size()) - first;
+    const auto others = static_cast<std::int64_t>(pieces.size() - p - 1);
+    room -= size;
+    done += static_cast<double>(piece.weight);
+    const double target = done / work * sums.back() - sums[static_cast<std::size_t>(first)];
+    piece.domains =
+        count_with_weight(sums, first, static_cast<int>(std::max<std::int64_t>(1, left - room)),
+                          static_cast<int>(std::min(size, left - others)), target);
+    first += piece.domains;
+  }
+}
+
 /// Gives every piece a number of domains: the next one always goes where domains are heaviest.
 void share_domains(std::vector<Piece>& pieces, int domains) {
   using Load = std::pair<double, int>;  // weight per domain, -piece: ties go to the first piece
@@ -114,15 +160,19 @@ void share_domains(std::vector<Piece>& pieces, int domains) {
   }
 }
 
-/// Packs components into `bins` sets, heaviest first into the lightest set.
-std::vector<Piece> pack(std::vector<Piece> pieces, int bins) {
+/// Packs components into `bins` sets, heaviest first, each into the set that is lightest with it,
+/// measured by the set's share. \param shares  per set; empty: equal.
+std::vector<Piece> pack(std::vector<Piece> pieces, int bins, std::span<const double> shares) {
   std::stable_sort(pieces.begin(), pieces.end(),
                    [](const Piece& a, const Piece& b) { return a.weight > b.weight; });
   std::vector<Piece> packed(static_cast<std::size_t>(bins));
   for (Piece& piece : pieces) {
-    Piece& bin =
-        *std::min_element(packed.begin(), packed.end(),
-                          [](const Piece& a, const Piece& b) { return a.weight < b.weight; });
+    const auto load = [&](const Piece& bin) {
+      const auto b = static_cast<std::size_t>(&bin - packed.data());
+      return static_cast<double>(bin.weight + piece.weight) / (shares.empty() ? 1.0 : shares[b]);
+    };
+    Piece& bin = *std::min_element(packed.begin(), packed.end(),
+                                   [&](const auto& a, const auto& b) { return load(a) < load(b); });
     bin.triangles.insert(bin.triangles.end(), piece.triangles.begin(), piece.triangles.end());
     bin.weight += piece.weight;
   }
@@ -132,8 +182,12 @@ std::vector<Piece> pack(std::vector<Piece> pieces, int bins) {
 /// Builds the tree top down; domains are numbered from left to right.
 class TreeBuilder {
  public:
-  TreeBuilder(const TriangleGraph& graph, const Options& options, Decomposition& result)
-      : graph_(graph), bisector_(graph, options.seed), result_(result) {}
+  /// \param weights  per domain; empty: equal
+  TreeBuilder(const TriangleGraph& graph, int seed, std::span<const double> weights,
+              Decomposition& result)
+      : graph_(graph), bisector_(graph, seed), result_(result) {
+    if (!weights.empty()) sums_ = prefix_sums(weights);
+  }
 
   /// Joins pieces by nodes without separator, then bisects each.
   int join(std::span<Piece> pieces, int parent) {
@@ -170,19 +224,36 @@ class TreeBuilder {
       ++result_.num_domains;
       return node;
     }
-    const int half = domains / 2;
-    const std::size_t first = bisector_.split(set, static_cast<double>(half) / domains);
+    const std::size_t first = bisector_.split(set, first_share(domains));
     // Domains are shared out by the weight that each side really got: where a set cannot be halved
     // (limbs of unequal size), the domains still can. Each needs a triangle.
     const double share = weight(set.first(first)) / weight(set);
     const int second = static_cast<int>(set.size() - first);
-    const int left =
-        std::clamp(static_cast<int>(std::lround(share * domains)), std::max(1, domains - second),
-                   std::min(domains - 1, static_cast<int>(first)));
+    const int left = first_domains(share, domains, std::max(1, domains - second),
+                                   std::min(domains - 1, static_cast<int>(first)));
     const int left_node = bisect(set.first(first), left, node);
     const int right_node = bisect(set.subspan(first), domains - left, node);
     finish(node, left_node, right_node);
     return node;
+  }
+
+  /// Share of the next `domains` domains' work that the first half of them gets.
+  [[nodiscard]] double first_share(int domains) const {
+    const int half = domains / 2;
+    if (sums_.empty()) return static_cast<double>(half) / domains;
+    return next_weight(half) / next_weight(domains);
+  }
+
+  /// How many of the next `domains` domains, `low` to `high`, fit into `share` of their work.
+  [[nodiscard]] int first_domains(double share, int domains, int low, int high) const {
+    if (sums_.empty()) return std::clamp(static_cast<int>(std::lround(share * domains)), low, high);
+    return count_with_weight(sums_, result_.num_domains, low, high, share * next_weight(domains));
+  }
+
+  /// Weight of the next `count` domains: those to the left are made already.
+  [[nodiscard]] double next_weight(int count) const {
+    return sums_[static_cast<std::size_t>(result_.num_domains) + static_cast<std::size_t>(count)] -
+           sums_[static_cast<std::size_t>(result_.num_domains)];
   }
 
   [[nodiscard]] double weight(std::span<const int> set) const {
@@ -194,7 +265,24 @@ class TreeBuilder {
   const TriangleGraph& graph_;
   Bisector bisector_;
   Decomposition& result_;
+  std::vector<double> sums_;  ///< of the domains' weights; empty: all are equal
 };
+
+/// The weights of the first `domains` domains; none if they are all the same.
+std::vector<double> checked_weights(const Options& options, int domains) {
+  const std::vector<double>& weights = options.domain_weights;
+  if (weights.empty()) return {};
+  if (weights.size() != static_cast<std::size_t>(options.domains))
+    throw InputError(fmt::format("domain_weights: {} weights for {} domains; give one per domain",
+                                 weights.size(), options.domains));
+  for (std::size_t d = 0; d < weights.size(); ++d)
+    if (!(weights[d] > 0) || !std::isfinite(weights[d]))
+      throw InputError(fmt::format("domain_weights: weight {} is {}; give a positive finite number",
+                                   d, weights[d]));
+  const auto last = weights.begin() + domains;
+  if (std::all_of(weights.begin(), last, [&](double w) { return w == weights[0]; })) return {};
+  return {weights.begin(), last};
+}
 
 void own_hinges(const Elements& elements, Decomposition& result) {
   result.hinge_domain.resize(elements.hinges.size());
@@ -303,17 +391,20 @@ Decomposition decompose(const Elements& elements, const Options& options) {
                     elements.triangles.size(), domains));
   }
 
+  const std::vector<double> weights = checked_weights(options, domains);
   const TriangleGraph graph = build_graph(elements);
   std::vector<Piece> pieces = connected_components(graph);
   if (static_cast<int>(pieces.size()) > domains) {
     result.notes.push_back(
         fmt::format("{} components in {} domains: some domains hold several components",
                     pieces.size(), domains));
-    pieces = pack(std::move(pieces), domains);
+    pieces = pack(std::move(pieces), domains, weights);
+  } else if (!weights.empty()) {
+    share_weighted_domains(pieces, weights);
   } else {
     share_domains(pieces, domains);
   }
-  TreeBuilder(graph, options, result).join(pieces, -1);
+  TreeBuilder(graph, options.seed, weights, result).join(pieces, -1);
   own_hinges(elements, result);
   place_vertices(elements, result);
   return result;

@@ -38,6 +38,8 @@ inline constexpr int kDefaultSeed = 1;
 struct Options {
   int domains = 32;
   int seed = kDefaultSeed;
+  /// Per domain: its share of the work, in any unit. Empty: equal shares.
+  std::vector<double> domain_weights;
 };
 
 /// A node of the bisection tree. Leaves are domains; an inner node owns its cut's separator.
@@ -84,7 +86,10 @@ struct Summary {
 /// Divides the triangles into connected, balanced domains (METIS, recursive bisection).
 /// Components are divided separately; with more components than domains, whole components share a
 /// domain. More domains than triangles are reduced to one per triangle, with a note.
-/// \throws InputError if options.domains < 1 or there is no triangle.
+/// With options.domain_weights every cut divides the work as the sums of the weights on its two
+/// sides; weights that are all the same give the bits of none.
+/// \throws InputError if options.domains < 1, there is no triangle, or the weights are not one
+///         positive finite number per domain.
 Decomposition decompose(const Elements& elements, const Options& options);
 
 /// Counts, edge cut and balance of a decomposition of `elements`.

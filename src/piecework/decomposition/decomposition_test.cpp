@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <string>
@@ -278,6 +279,101 @@ TEST(Decomposition, AdjacentDomainsMatchBruteForce) {
   const auto pairs = adjacent_domains(d, grid.hinges);
   EXPECT_EQ(std::set(pairs.begin(), pairs.end()), expected);
   EXPECT_GT(pairs.size(), 8U);
+}
+
+/// Constraints per domain over the mean, the work that weights share out.
+std::vector<double> work_of_domains(const Case& c, const Decomposition& d) {
+  std::vector<double> work(static_cast<std::size_t>(d.num_domains), 0);
+  const auto per = static_cast<double>(c.mesh.triangles.size() + c.hinges.size()) / d.num_domains;
+  for (const int domain : d.triangle_domain) work[static_cast<std::size_t>(domain)] += 1 / per;
+  for (const mesh::Hinge& h : c.hinges)
+    for (const int t : h.triangles)
+      work[static_cast<std::size_t>(d.triangle_domain[static_cast<std::size_t>(t)])] += 0.5 / per;
+  return work;
+}
+
+TEST(DomainWeights, SizesFollowThem) {
+  const Case grid(testing::grid_mesh(101, 101));
+  std::vector<double> hybrid(16, 1.0);
+  std::fill(hybrid.begin() + 8, hybrid.end(), 0.55);
+  for (const std::vector<double>& weights :
+       {hybrid, {3, 1}, {1, 2, 3, 4, 5}, {1, 1, 1, 0.2, 0.2, 0.2, 0.2}, {0.25, 4, 1, 1}}) {
+    const Decomposition d = decompose(
+        grid.elements(), {.domains = static_cast<int>(weights.size()), .domain_weights = weights});
+    ASSERT_EQ(static_cast<std::size_t>(d.num_domains), weights.size());
+    expect_sound(grid, d);
+    const double mean = std::accumulate(weights.begin(), weights.end(), 0.0) / d.num_domains;
+    const std::vector<double> work = work_of_domains(grid, d);
+    for (std::size_t k = 0; k < weights.size(); ++k) {
+      EXPECT_TRUE(connected(grid, d, static_cast<int>(k)));
+      EXPECT_NEAR(work[k] / (weights[k] / mean), 1.0, 0.05) << k << " of " << weights.size();
+    }
+  }
+}
+
+TEST(DomainWeights, EqualOnesGiveTheBitsOfNone) {
+  const Case grid(testing::grid_mesh(31, 31));
+  for (const int domains : {1, 5, 16, 5000}) {
+    const std::vector<double> weights(static_cast<std::size_t>(domains), 0.3);
+    const Decomposition none = grid.decompose(domains);
+    const Decomposition equal =
+        decompose(grid.elements(), {.domains = domains, .domain_weights = weights});
+    EXPECT_EQ(equal.triangle_domain, none.triangle_domain);
+    EXPECT_EQ(equal.hinge_domain, none.hinge_domain);
+    EXPECT_EQ(equal.vertex_node, none.vertex_node);
+  }
+}
+
+/// Two sheets, one with four times the triangles of the other.
+Case two_sheets() {
+  mesh::TriangleMesh mesh = testing::grid_mesh(41, 41);
+  const mesh::TriangleMesh small = testing::grid_mesh(21, 21);
+  const int offset = mesh.num_vertices();
+  Positions all(offset + small.num_vertices(), 3);
+  all << mesh.positions, small.positions;
+  mesh.positions = all;
+  for (const Triangle& t : small.triangles)
+    mesh.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  return Case(std::move(mesh));
+}
+
+TEST(DomainWeights, ComponentsGetTheDomainsThatFit) {
+  const Case sheets = two_sheets();
+  const Decomposition d =
+      decompose(sheets.elements(), {.domains = 6, .domain_weights = {1, 1, 1, 1, 0.5, 0.5}});
+  expect_sound(sheets, d);
+  for (std::size_t t = 0; t < 3200; ++t) EXPECT_LT(d.triangle_domain[t], 4);
+  for (std::size_t t = 3200; t < 4000; ++t) EXPECT_GE(d.triangle_domain[t], 4);
+  // More components than domains: whole components, the large one where the weight is.
+  const Decomposition one = decompose(sheets.elements(), {.domains = 1, .domain_weights = {2}});
+  EXPECT_EQ(one.num_domains, 1);
+  // Every number of domains up to one per triangle, the last ones heavy.
+  for (const int domains : {2, 3, 100, 3999, 4000}) {
+    std::vector<double> weights(static_cast<std::size_t>(domains), 0.001);
+    weights.back() = 1000;
+    const Decomposition many =
+        decompose(sheets.elements(), {.domains = domains, .domain_weights = weights});
+    EXPECT_EQ(many.num_domains, domains);
+    const std::set<int> used(many.triangle_domain.begin(), many.triangle_domain.end());
+    EXPECT_EQ(used.size(), static_cast<std::size_t>(domains));
+  }
+}
+
+TEST(DomainWeights, MoreComponentsThanDomainsFillThemByWeight) {
+  mesh::TriangleMesh mesh;  // 40 triangles that touch nowhere
+  mesh.positions = Positions::Random(120, 3);
+  for (int t = 0; t < 40; ++t) mesh.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  const Case c(std::move(mesh));
+  const Decomposition d = decompose(c.elements(), {.domains = 2, .domain_weights = {1, 3}});
+  EXPECT_EQ(std::count(d.triangle_domain.begin(), d.triangle_domain.end(), 0), 10);
+}
+
+TEST(DomainWeights, RefuseNonsense) {
+  const Case grid(testing::grid_mesh(5, 5));
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const std::vector<double>& weights :
+       std::vector<std::vector<double>>{{1}, {1, 1, 1}, {1, 0}, {-1, 1}, {1, inf}, {NAN, 1}})
+    EXPECT_THROW(decompose(grid.elements(), {.domains = 2, .domain_weights = weights}), InputError);
 }
 
 TEST(Decomposition, RefusesNonsense) {

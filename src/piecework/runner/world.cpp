@@ -243,14 +243,14 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
   hold_seams(*world);
   world->load_ms = watch.lap();
 
-  world->domains = decomposition::decompose(world->elements(), {.domains = scene.solver.domains});
+  world->domains = decomposition::decompose(
+      world->elements(),
+      {.domains = scene.solver.domains, .domain_weights = scene.solver.domain_weights});
   world->domain_summary = decomposition::summarize(world->domains, world->elements());
   world->notes.insert(world->notes.end(), world->domains.notes.begin(), world->domains.notes.end());
   world->partition_ms = watch.lap();
   return world;
 }
-
-namespace {
 
 std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
   const scene::Solver& solver = world.scene.solver;
@@ -272,8 +272,6 @@ std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
       {.precision = world.scene.quality.precision == "single" ? global::Precision::Single
                                                               : global::Precision::Double});
 }
-
-}  // namespace
 
 std::unique_ptr<model::Integrator> make_integrator(const World& world) {
   const scene::Scene& scene = world.scene;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <piecework/decomposition/decomposition.hpp>
+#include <piecework/global/exact_solver.hpp>
 #include <piecework/mesh/triangle_mesh.hpp>
 #include <piecework/model/constraints.hpp>
 #include <piecework/model/forces.hpp>
@@ -51,6 +52,9 @@ std::unique_ptr<World> build_world(const scene::Scene& scene);
 
 /// The mesh that a scene's `mesh` object describes, in its own coordinates.
 mesh::MeshDocument load_mesh(const scene::Mesh& mesh);
+
+/// The exact global solve that the scene asks for, not yet factored. \pre `world` outlives it.
+std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world);
 
 /// The integrator that the scene asks for. \pre `world` outlives it.
 std::unique_ptr<model::Integrator> make_integrator(const World& world);

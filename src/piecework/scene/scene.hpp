@@ -133,6 +133,7 @@ struct Solver {
   std::string global = "tree";
   std::string local = "jacobi";
   int domains = 32;
+  std::vector<double> domain_weights;  ///< per domain; empty: equal
   double corner_fraction = 0.5;
   std::string interface = "recursive";
   int threads = 0;  ///< 0: what the machine allows

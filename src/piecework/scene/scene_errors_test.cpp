@@ -295,6 +295,12 @@ TEST(SceneErrors, ChoicesAndReferences) {
             "dx_inf, iterations"},
            {with(R"("solver": { "global": @"trees" })"),
             "/solver/global: unknown value \"trees\"; did you mean \"tree\"?"},
+           {with(R"("solver": { "domains": 3, "domain_weights": @[1, 2] })"),
+            "/solver/domain_weights: 2 weights for 3 domains; write one per domain, or [] for "
+            "equal domains"},
+           {with(R"("solver": { "domain_weights": @[1] })"),
+            "/solver/domain_weights: 1 weights for 32 domains; write one per domain, or [] for "
+            "equal domains"},
            {with(R"("expect": [ { "quantity": @"lowestY", "min": 0 } ])"),
             "/expect/0/quantity: unknown value \"lowestY\"; did you mean \"lowest_y\"?"},
            {with_cloth(R"({ "mesh": { "generator": "sheet" }, "material": @"coton" })"),

@@ -353,6 +353,10 @@ void fields(V& v, Solver& s) {
            {{"jacobi", "all constraints projected at the same positions, in parallel"}});
   v.value({"domains", "domains to divide the cloths into (1: undivided)"}, s.domains,
           between(1, 65536));
+  v.value({"domain_weights",
+           "share of the work that each domain gets, in any unit, one number per domain; absent: "
+           "equal. `piecework tune` proposes them for processors with cores of several speeds"},
+          s.domain_weights, between(1e-3, 1e3));
   v.value({"corner_fraction",
            "`global: primal_dual`: share of the vertices of two domains that become corners"},
           s.corner_fraction, between(0, 1));

@@ -30,6 +30,7 @@ constexpr const char* kEveryKey = R"({
             "gust_amplitude": 0.25, "gust_period": 3 },
   "damping": 0.125,
   "solver": { "method": "vanilla_pd", "global": "single", "local": "jacobi", "domains": 5,
+              "domain_weights": [1, 1, 1, 0.5, 0.25],
               "threads": 3 },
   "quality": { "stop": "dx_rms", "tolerance": 1e-3, "max_iterations": 11, "min_iterations": 2 },
   "materials": { "m/1": { "density": 0.1, "stretching": 3e5, "thickness": 1e-3, "bending": 2e-6 },
@@ -114,7 +115,7 @@ Scene expected_every_key() {
   scene.gravity = {1, 2, 3};
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;
-  scene.solver = {"vanilla_pd", "single", "jacobi", 5, 0.5, "recursive", 3};
+  scene.solver = {"vanilla_pd", "single", "jacobi", 5, {1, 1, 1, 0.5, 0.25}, 0.5, "recursive", 3};
   scene.quality = {"dx_rms", 1e-3, 11, 2};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();
@@ -183,6 +184,7 @@ TEST(SceneIo, NullSwitchesOff) {
 TEST(SceneIo, OverridesReachEveryKindOfKey) {
   const Scene scene = parse_scene(kEveryKey, "s",
                                   {{"solver.domains", "16"},
+                                   {"solver.domain_weights", "[]"},
                                    {"step.h", "1e-3"},
                                    {"render.borders", "true"},
                                    {"quality.stop", "gradient"},
@@ -195,6 +197,7 @@ TEST(SceneIo, OverridesReachEveryKindOfKey) {
                                    {"cloths.1.pins.0.region.sets.0", "border"},
                                    {"expect.1", "{\"quantity\": \"max_speed\", \"max\": 3}"}});
   EXPECT_EQ(scene.solver.domains, 16);
+  EXPECT_TRUE(scene.solver.domain_weights.empty());
   EXPECT_EQ(scene.step.h, 1e-3);
   EXPECT_TRUE(scene.render.borders);
   EXPECT_EQ(scene.quality.stop, "error");

@@ -142,6 +142,13 @@ void check_expectation(const Expectation& expected, const Scene& scene, const Pa
                "add \"cloth\", the name of one");
 }
 
+void check_domain_weights(const Solver& solver, const Part& part) {
+  const std::size_t count = solver.domain_weights.size();
+  part.require(count == 0 || count == static_cast<std::size_t>(solver.domains),
+               fmt::format("{} weights for {} domains", count, solver.domains),
+               "write one per domain, or [] for equal domains");
+}
+
 /// A misspelt override must not pass as the definition of a new material.
 void check_overridden_materials(const Scene& scene, const Document& document, const Part& part) {
   std::vector<std::string> used;
@@ -161,6 +168,7 @@ void check_rules(const Scene& scene, const Document& document) {
   check_overridden_materials(scene, document, root.in("materials"));
   check_order(root.in("quality").in("max_iterations"), scene.quality.min_iterations,
               scene.quality.max_iterations, "min_iterations", "max_iterations");
+  check_domain_weights(scene.solver, root.in("solver").in("domain_weights"));
   root.in("step")
       .in("output_every")
       .require(
