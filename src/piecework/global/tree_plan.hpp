@@ -70,7 +70,6 @@ struct TreePlan {
   std::size_t factor_numbers = 0;  ///< of the factor's storage
   std::size_t own_begin = 0;       ///< from here on it holds pivot blocks
   std::size_t workspace = 0;       ///< numbers of all vectors
-  int max_panel_columns = 0;
   int boundary_front = -1;  ///< front that is not eliminated, -1 without
 };
 
