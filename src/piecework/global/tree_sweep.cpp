@@ -368,9 +368,10 @@ void TreeSweep<T>::solve_with(const TreeFactor<T>& factor, const VectorView<cons
                               const VectorView<const double>& other_b,
                               const VectorView<double>& other_x) {
   PIECEWORK_ASSERT(other.plan_.factor_numbers == plan_.factor_numbers);
+  // One after the other in the loop, not in turns: each thread then reads one factor in order.
   const auto both = [](std::size_t count, const auto& ours, const auto& theirs) {
     parallel_for(
-        2 * count, [&](std::size_t i) { i % 2 == 0 ? ours(i / 2) : theirs(i / 2); }, 1);
+        2 * count, [&](std::size_t i) { i < count ? ours(i) : theirs(i - count); }, 1);
   };
   both(
       plan_.tasks.size(), [&](std::size_t t) { forward_task(factor, t, b); },
