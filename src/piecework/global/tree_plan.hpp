@@ -70,7 +70,7 @@ struct TreePlan {
   std::size_t factor_numbers = 0;  ///< of the factor's storage
   std::size_t own_begin = 0;       ///< from here on it holds pivot blocks
   std::size_t workspace = 0;       ///< numbers of all vectors
-  int boundary_front = -1;  ///< front that is not eliminated, -1 without
+  int boundary_front = -1;         ///< front that is not eliminated, -1 without
 };
 
 TreePlan plan_tree(const Symbolic& symbolic, const PlanOptions& options, const PanelLayout& layout);
