@@ -54,13 +54,7 @@ class BasicInterleavedTimer {
   /// Times one call of each, swapping the order from call to call.
   template <class A, class B>
   void sample(A&& a, B&& b) {
-    if (a_.wall.size() % 2 == 0) {
-      a_.time(a);
-      b_.time(b);
-    } else {
-      b_.time(b);
-      a_.time(a);
-    }
+    in_turns([&] { a_.time(a); }, [&] { b_.time(b); });
   }
 
   /// The same for code that in real use runs many times in a row: each timed call follows an
@@ -71,13 +65,7 @@ class BasicInterleavedTimer {
       function();
       series.time(function);
     };
-    if (a_.wall.size() % 2 == 0) {
-      warm(a_, a);
-      warm(b_, b);
-    } else {
-      warm(b_, b);
-      warm(a_, a);
-    }
+    in_turns([&] { warm(a_, a); }, [&] { warm(b_, b); });
   }
 
   /// Seconds of the newest call of A; at least one sample must have been taken.
@@ -133,6 +121,14 @@ class BasicInterleavedTimer {
       cpu_seconds += Clock::cpu() - cpu;
     }
   };
+
+  template <class First, class Second>
+  void in_turns(const First& time_a, const Second& time_b) {
+    const bool a_first = a_.wall.size() % 2 == 0;
+    if (a_first) time_a();
+    time_b();
+    if (!a_first) time_a();
+  }
 
   template <class Counters>
   static void write_interval(Counters& counters, const char* name, const MedianInterval& interval,

@@ -29,6 +29,20 @@ TEST(InterleavedTimer, SwapsTheOrderFromPairToPair) {
   EXPECT_EQ(order, "abbaab");
 }
 
+TEST(InterleavedTimer, WarmsUpBeforeEachTimedCallInARow) {
+  FakeTimer timer;
+  std::string order;
+  for (int i = 0; i < 2; ++i)
+    timer.sample_in_a_row(
+        [&] {
+          order += 'a';
+          FakeClock::pass(static_cast<double>(order.size()), 0);
+        },
+        [&] { order += 'b'; });
+  EXPECT_EQ(order, "aabbbbaa");
+  EXPECT_DOUBLE_EQ(timer.last_a(), 8) << "the first call of the two is not timed";
+}
+
 TEST(InterleavedTimer, KeepsEveryTimeWhereItBelongs) {
   FakeTimer timer;
   for (int i = 1; i <= 7; ++i) {

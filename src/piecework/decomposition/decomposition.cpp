@@ -309,8 +309,44 @@ void for_each_incidence(const Elements& elements, const Decomposition& result, c
         visit_carriers(vertex, result.hinge_domain[h]);
 }
 
-/// Domains of each vertex: counted, filled, then sorted and made unique in place.
-mesh::Adjacency collect_vertex_domains(const Elements& elements, const Decomposition& result) {
+/// The deepest node whose domains include everything from `low` to `high`.
+int lowest_common_node(const std::vector<TreeNode>& nodes, int low, int high) {
+  const auto covers = [&](int node) {
+    const TreeNode& n = nodes[static_cast<std::size_t>(node)];
+    return n.first_domain <= low && high < n.first_domain + n.num_domains;
+  };
+  int node = 0;
+  for (;;) {
+    const auto [left, right] = nodes[static_cast<std::size_t>(node)].children;
+    if (left >= 0 && covers(left))
+      node = left;
+    else if (right >= 0 && covers(right))
+      node = right;
+    else
+      return node;
+  }
+}
+
+void place_vertices(const Elements& elements, Decomposition& result) {
+  result.vertex_domains = constraint_domains(elements, result);
+  result.vertex_node.assign(static_cast<std::size_t>(elements.num_vertices), 0);
+  parallel_for(result.vertex_node.size(), [&](std::size_t v) {
+    const int first = result.vertex_domains.begin[v];
+    const int last = result.vertex_domains.begin[v + 1];
+    if (first == last) return;  // a vertex without constraint may be solved anywhere: the root
+    result.vertex_node[v] = lowest_common_node(
+        result.nodes, result.vertex_domains.item[static_cast<std::size_t>(first)],
+        result.vertex_domains.item[static_cast<std::size_t>(last) - 1]);
+  });
+  if (elements.seams == nullptr) return;
+  for (const int slave : elements.seams->slaves)
+    result.vertex_node[static_cast<std::size_t>(slave)] = -1;
+}
+
+}  // namespace
+
+// Counted, filled, then sorted and made unique in place.
+mesh::Adjacency constraint_domains(const Elements& elements, const Decomposition& result) {
   const auto count = static_cast<std::size_t>(elements.num_vertices);
   std::vector<int> begin(count + 1, 0);
   for_each_incidence(elements, result,
@@ -332,42 +368,6 @@ mesh::Adjacency collect_vertex_domains(const Elements& elements, const Decomposi
   }
   return domains;
 }
-
-/// The deepest node whose domains include everything from `low` to `high`.
-int lowest_common_node(const std::vector<TreeNode>& nodes, int low, int high) {
-  const auto covers = [&](int node) {
-    const TreeNode& n = nodes[static_cast<std::size_t>(node)];
-    return n.first_domain <= low && high < n.first_domain + n.num_domains;
-  };
-  int node = 0;
-  for (;;) {
-    const auto [left, right] = nodes[static_cast<std::size_t>(node)].children;
-    if (left >= 0 && covers(left))
-      node = left;
-    else if (right >= 0 && covers(right))
-      node = right;
-    else
-      return node;
-  }
-}
-
-void place_vertices(const Elements& elements, Decomposition& result) {
-  result.vertex_domains = collect_vertex_domains(elements, result);
-  result.vertex_node.assign(static_cast<std::size_t>(elements.num_vertices), 0);
-  parallel_for(result.vertex_node.size(), [&](std::size_t v) {
-    const int first = result.vertex_domains.begin[v];
-    const int last = result.vertex_domains.begin[v + 1];
-    if (first == last) return;  // a vertex without constraint may be solved anywhere: the root
-    result.vertex_node[v] = lowest_common_node(
-        result.nodes, result.vertex_domains.item[static_cast<std::size_t>(first)],
-        result.vertex_domains.item[static_cast<std::size_t>(last) - 1]);
-  });
-  if (elements.seams == nullptr) return;
-  for (const int slave : elements.seams->slaves)
-    result.vertex_node[static_cast<std::size_t>(slave)] = -1;
-}
-
-}  // namespace
 
 DofClass Decomposition::dof_class(int vertex) const {
   const auto v = static_cast<std::size_t>(vertex);

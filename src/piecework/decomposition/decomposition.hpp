@@ -92,6 +92,11 @@ struct Summary {
 ///         positive finite number per domain.
 Decomposition decompose(const Elements& elements, const Options& options);
 
+/// Per vertex: the domains that own a constraint on it, ascending; with `elements.seams`, on it or
+/// on what it carries, and none for slaves. `decomposition` needs its owners of triangles and
+/// hinges.
+mesh::Adjacency constraint_domains(const Elements& elements, const Decomposition& decomposition);
+
 /// Counts, edge cut and balance of a decomposition of `elements`.
 Summary summarize(const Decomposition& decomposition, const Elements& elements);
 

@@ -47,6 +47,19 @@ cholmod_sparse view(const SparseMatrix& K) {
   return view;
 }
 
+/// A view of right-hand sides in column-major order.
+cholmod_dense view(double* b, std::size_t rows, std::size_t columns) {
+  cholmod_dense view{};
+  view.nrow = rows;
+  view.ncol = columns;
+  view.nzmax = rows * columns;
+  view.d = rows;
+  view.x = b;
+  view.xtype = CHOLMOD_REAL;
+  view.dtype = CHOLMOD_DOUBLE;
+  return view;
+}
+
 }  // namespace
 
 struct CholmodSolver::Impl {
@@ -138,14 +151,7 @@ SolveStatus CholmodSolver::solve(double* b, int columns) {
   const auto rows = static_cast<std::size_t>(impl_->rows);
   const auto count = static_cast<std::size_t>(columns);
   if (rows * count == 0) return SolveStatus::Ok;
-  cholmod_dense rhs{};
-  rhs.nrow = rows;
-  rhs.ncol = count;
-  rhs.nzmax = rows * count;
-  rhs.d = rows;
-  rhs.x = b;
-  rhs.xtype = CHOLMOD_REAL;
-  rhs.dtype = CHOLMOD_DOUBLE;
+  cholmod_dense rhs = view(b, rows, count);
   if (!cholmod_solve2(CHOLMOD_A, impl_->factor, &rhs, nullptr, &impl_->x, nullptr, &impl_->y,
                       &impl_->e, &impl_->common))
     return to_status(impl_->common.status);
@@ -157,14 +163,8 @@ SolveStatus CholmodSolver::solve_many(Eigen::MatrixXd& b) const {
   if (!impl_->factored) return SolveStatus::NotFactored;
   PIECEWORK_ASSERT(b.rows() == impl_->rows);
   if (b.size() == 0) return SolveStatus::Ok;
-  cholmod_dense rhs{};
-  rhs.nrow = static_cast<std::size_t>(b.rows());
-  rhs.ncol = static_cast<std::size_t>(b.cols());
-  rhs.nzmax = rhs.nrow * rhs.ncol;
-  rhs.d = rhs.nrow;
-  rhs.x = b.data();
-  rhs.xtype = CHOLMOD_REAL;
-  rhs.dtype = CHOLMOD_DOUBLE;
+  cholmod_dense rhs =
+      view(b.data(), static_cast<std::size_t>(b.rows()), static_cast<std::size_t>(b.cols()));
   cholmod_dense* x = cholmod_solve(CHOLMOD_A, impl_->factor, &rhs, &impl_->common);
   if (!x) return to_status(impl_->common.status);
   b = Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(x->x), b.rows(), b.cols());

@@ -138,6 +138,8 @@ class Factorizer {
   void extend_add(int child, const N* update, int parent, const FrontMatrix<N>& matrix,
                   std::vector<RowRun>& runs);
   bool eliminate(int f, const FrontMatrix<N>& matrix, bool tiled, Scratch& scratch);
+  static void copy_update(const FrontMatrix<N>& matrix, N* out);
+  void keep_update(int f, const FrontMatrix<N>& matrix);
   void update_trailing(const FrontMatrix<N>& matrix, int first, int end, bool tiled);
   void store_panel(std::size_t p, const FrontMatrix<N>& matrix, double diagonal, Scratch& scratch);
   void pack(const N* from, int ld, int rows, int cols, N sign, T* to) const;
@@ -343,6 +345,24 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
   return true;
 }
 
+/// The lower triangle of what an eliminated front leaves to its parent.
+template <class T, class N>
+void Factorizer<T, N>::copy_update(const FrontMatrix<N>& matrix, N* out) {
+  const auto rows = static_cast<std::size_t>(matrix.rows);
+  for (std::size_t c = 0; c < rows; ++c) {
+    const int diagonal = matrix.width + static_cast<int>(c);
+    std::copy_n(matrix.at(diagonal, diagonal), rows - c, out + c * rows + c);
+  }
+}
+
+template <class T, class N>
+void Factorizer<T, N>::keep_update(int f, const FrontMatrix<N>& matrix) {
+  const auto rows = static_cast<std::size_t>(matrix.rows);
+  auto& update = updates_[static_cast<std::size_t>(f)];
+  update = AlignedArray<N>(rows * rows);
+  copy_update(matrix, update.data());
+}
+
 /// Postorder with a stack of update matrices; the root's is left in updates_.
 template <class T, class N>
 void Factorizer<T, N>::factor_subtree(const Subtree& subtree, Scratch& scratch) {
@@ -376,18 +396,12 @@ void Factorizer<T, N>::factor_subtree(const Subtree& subtree, Scratch& scratch) 
       scratch.outcome.status = SolveStatus::NotPositiveDefinite;
       return;
     }
-    const auto rows = static_cast<std::size_t>(current.num_rows);
-    N* out = top;
     if (f == subtree.last_front) {
-      updates_[static_cast<std::size_t>(f)] = AlignedArray<N>(rows * rows);
-      out = updates_[static_cast<std::size_t>(f)].data();
+      keep_update(f, matrix);
     } else {
+      copy_update(matrix, top);
       top += square(f);
     }
-    for (std::size_t c = 0; c < rows; ++c)
-      std::copy_n(
-          matrix.at(current.width + static_cast<int>(c), current.width + static_cast<int>(c)),
-          rows - c, out + c * rows + c);
   }
 }
 
@@ -412,12 +426,7 @@ void Factorizer<T, N>::factor_top(int f, Scratch& scratch) {
     scratch.outcome.status = SolveStatus::NotPositiveDefinite;
     return;
   }
-  const auto rows = static_cast<std::size_t>(current.num_rows);
-  auto& update = updates_[static_cast<std::size_t>(f)];
-  update = AlignedArray<N>(rows * rows);
-  for (std::size_t c = 0; c < rows; ++c)
-    std::copy_n(matrix.at(current.width + static_cast<int>(c), current.width + static_cast<int>(c)),
-                rows - c, update.data() + c * rows + c);
+  keep_update(f, matrix);
 }
 
 template <class T, class N>

@@ -1,5 +1,7 @@
 #include <piecework/model/reduction.hpp>
 
+#include <algorithm>
+
 #include <piecework/core/parallel.hpp>
 
 namespace piecework::model {
@@ -11,6 +13,20 @@ std::vector<char> without_slaves(const ClothModel& model, std::vector<char> fixe
   return fixed;
 }
 
+using Triplets = std::vector<Eigen::Triplet<double, int>>;
+
+/// T_f^T e_row value e_column^T T_f.
+void fold_entry(const Reduction& reduction, const mesh::SeamMap& seams, int row, int column,
+                double value, Triplets& triplets) {
+  seams.visit_carriers(column, [&](int c, double c_weight) {
+    seams.visit_carriers(row, [&](int r, double r_weight) {
+      if (reduction.number(c) >= 0 && reduction.number(r) >= 0)
+        triplets.emplace_back(reduction.number(r), reduction.number(c),
+                              r_weight * c_weight * value);
+    });
+  });
+}
+
 }  // namespace
 
 Reduction::Reduction(const ClothModel& model, const std::vector<char>& fixed)
@@ -18,20 +34,45 @@ Reduction::Reduction(const ClothModel& model, const std::vector<char>& fixed)
 
 SparseMatrix Reduction::system(const SparseMatrix& K) const {
   if (model_->sewing.empty()) return restrict_to_free(K, free_);
-  const mesh::SeamMap& seams = model_->sewing.map();
-  std::vector<Eigen::Triplet<double, int>> triplets;
+  Triplets triplets;
   triplets.reserve(static_cast<std::size_t>(K.nonZeros()));
   for (int column = 0; column < K.outerSize(); ++column)
     for (SparseMatrix::InnerIterator it(K, column); it; ++it)
-      seams.visit_carriers(column, [&](int c, double c_weight) {
-        seams.visit_carriers(static_cast<int>(it.row()), [&](int r, double r_weight) {
-          if (number(c) >= 0 && number(r) >= 0)
-            triplets.emplace_back(number(r), number(c), r_weight * c_weight * it.value());
-        });
-      });
+      fold_entry(*this, model_->sewing.map(), static_cast<int>(it.row()), column, it.value(),
+                 triplets);
   SparseMatrix reduced(count(), count());
   reduced.setFromTriplets(triplets.begin(), triplets.end());
   return reduced;
+}
+
+DomainMatrix Reduction::folded_share(const DomainMatrix& share) const {
+  Triplets triplets;
+  const auto vertex_of = [&](Eigen::Index i) { return share.rows[static_cast<std::size_t>(i)]; };
+  for (int column = 0; column < share.K.outerSize(); ++column)
+    for (SparseMatrix::InnerIterator it(share.K, column); it; ++it)
+      fold_entry(*this, model_->sewing.map(), vertex_of(it.row()), vertex_of(column), it.value(),
+                 triplets);
+  DomainMatrix result;
+  for (const auto& entry : triplets) result.rows.push_back(entry.row());
+  std::sort(result.rows.begin(), result.rows.end());
+  result.rows.erase(std::unique(result.rows.begin(), result.rows.end()), result.rows.end());
+  const auto local = [&](int unknown) {
+    return static_cast<int>(std::lower_bound(result.rows.begin(), result.rows.end(), unknown) -
+                            result.rows.begin());
+  };
+  for (auto& entry : triplets) entry = {local(entry.row()), local(entry.col()), entry.value()};
+  const auto size = static_cast<Eigen::Index>(result.rows.size());
+  result.K.resize(size, size);
+  result.K.setFromTriplets(triplets.begin(), triplets.end());
+  return result;
+}
+
+std::vector<DomainMatrix> Reduction::systems(std::span<const DomainMatrix> shares) const {
+  if (model_->sewing.empty()) return restrict_to_free(shares, free_);
+  std::vector<DomainMatrix> result;
+  result.reserve(shares.size());
+  for (const DomainMatrix& share : shares) result.push_back(folded_share(share));
+  return result;
 }
 
 void Reduction::advance(const Unknowns& increment, Positions& x) const {

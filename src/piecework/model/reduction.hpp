@@ -2,6 +2,7 @@
 
 // The unknowns of a step: vertices that are neither held nor slaves of a seam.
 
+#include <span>
 #include <vector>
 
 #include <piecework/core/types.hpp>
@@ -39,6 +40,10 @@ class Reduction {
   /// K~, n_f x n_f, N/m. \param K  assemble_system(), |V| x |V|.
   [[nodiscard]] SparseMatrix system(const SparseMatrix& K) const;
 
+  /// The same of each domain's share of K: together they sum to K~.
+  /// \param shares  assemble_domain_systems()
+  [[nodiscard]] std::vector<DomainMatrix> systems(std::span<const DomainMatrix> shares) const;
+
   /// Row i of T_f^T f; f is |V| x 3.
   [[nodiscard]] Eigen::RowVector3d row(const Positions& f, int i) const {
     return model_->sewing.folded(f, vertex(i));
@@ -48,6 +53,8 @@ class Reduction {
   void advance(const Unknowns& increment, Positions& x) const;
 
  private:
+  [[nodiscard]] DomainMatrix folded_share(const DomainMatrix& share) const;
+
   const ClothModel* model_ = nullptr;
   FreeVertices free_;
 };

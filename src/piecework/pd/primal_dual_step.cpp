@@ -1,7 +1,5 @@
 #include <piecework/pd/primal_dual_step.hpp>
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include <piecework/model/assembly.hpp>
@@ -10,56 +8,11 @@
 namespace piecework::pd {
 namespace {
 
-/// T_f^T K^j T_f on the unknowns that it couples.
-DomainMatrix reduce(const DomainMatrix& share, const model::Reduction& reduction,
-                    int num_vertices) {
-  std::vector<Eigen::Triplet<double, int>> entries;
-  entries.reserve(static_cast<std::size_t>(share.K.nonZeros()));
-  for (int c = 0; c < share.K.outerSize(); ++c)
-    for (SparseMatrix::InnerIterator it(share.K, c); it; ++it)
-      entries.emplace_back(share.rows[static_cast<std::size_t>(it.row())],
-                           share.rows[static_cast<std::size_t>(c)], it.value());
-  SparseMatrix whole(num_vertices, num_vertices);
-  whole.setFromTriplets(entries.begin(), entries.end());
-  const SparseMatrix reduced = reduction.system(whole);
-
-  DomainMatrix result;
-  std::vector<int> local(static_cast<std::size_t>(reduced.cols()), -1);
-  for (int c = 0; c < reduced.outerSize(); ++c) {
-    if (reduced.outerIndexPtr()[c] == reduced.outerIndexPtr()[c + 1]) continue;
-    local[static_cast<std::size_t>(c)] = static_cast<int>(result.rows.size());
-    result.rows.push_back(c);
-  }
-  entries.clear();
-  for (const int c : result.rows)
-    for (SparseMatrix::InnerIterator it(reduced, c); it; ++it)
-      entries.emplace_back(local[static_cast<std::size_t>(it.row())],
-                           local[static_cast<std::size_t>(c)], it.value());
-  const auto size = static_cast<Eigen::Index>(result.rows.size());
-  result.K.resize(size, size);
-  result.K.setFromTriplets(entries.begin(), entries.end());
-  return result;
-}
-
-/// Per vertex: the domains that own a constraint on it, before anything is sewn or held.
+/// Per vertex: the domains that own a constraint on it, before anything is sewn.
 mesh::Adjacency owning_domains(const model::ClothModel& model,
                                const decomposition::Decomposition& domains) {
-  std::vector<std::vector<int>> lists(static_cast<std::size_t>(model.num_vertices()));
-  for (std::size_t t = 0; t < model.triangles.size(); ++t)
-    for (const int v : model.triangles[t])
-      lists[static_cast<std::size_t>(v)].push_back(domains.triangle_domain[t]);
-  for (std::size_t h = 0; h < model.hinges.size(); ++h)
-    if (model.hinge_bends[h])
-      for (const int v : model.hinges[h].vertices)
-        lists[static_cast<std::size_t>(v)].push_back(domains.hinge_domain[h]);
-  mesh::Adjacency result;
-  result.begin.push_back(0);
-  for (auto& list : lists) {
-    std::sort(list.begin(), list.end());
-    result.item.insert(result.item.end(), list.begin(), std::unique(list.begin(), list.end()));
-    result.begin.push_back(static_cast<int>(result.item.size()));
-  }
-  return result;
+  return decomposition::constraint_domains(
+      {model.triangles, model.hinges, model.hinge_bends, model.num_vertices()}, domains);
 }
 
 class PrimalDualStep final : public global::ExactSolver {
@@ -78,9 +31,7 @@ class PrimalDualStep final : public global::ExactSolver {
     std::vector<char> fixed(static_cast<std::size_t>(model_.num_vertices()), 1);
     for (const int vertex : row_vertex) fixed[static_cast<std::size_t>(vertex)] = 0;
     const model::Reduction reduction(model_, fixed);
-    std::vector<DomainMatrix> domains;
-    for (const DomainMatrix& share : shares_)
-      domains.push_back(reduce(share, reduction, model_.num_vertices()));
+    const std::vector<DomainMatrix> domains = reduction.systems(shares_);
     global::InterfaceDofs dofs = global::classify_dofs(
         domains, static_cast<int>(K.rows()), {.corner_fraction = options_.corner_fraction});
     const global::SolveStatus status = solver_.factor(domains, std::move(dofs), options_.solver);

@@ -40,14 +40,7 @@ constexpr const char* kBySet =
 
 std::string by_set(const std::string& more = "") { return kBySet + more + "}"; }
 
-std::string refusal(const scene::Scene& scene) {
-  try {
-    (void)build_world(scene);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+using runner::refusal;  // beside the one below
 
 std::string refusal(const std::string& seams, double gap = 0) {
   try {

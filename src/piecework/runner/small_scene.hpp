@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include <piecework/core/error.hpp>
+#include <piecework/runner/world.hpp>
 #include <piecework/scene/scene_io.hpp>
 
 namespace piecework::runner {
@@ -49,5 +51,15 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// What build_world() says against a scene; empty if nothing.
+inline std::string refusal(const scene::Scene& scene) {
+  try {
+    (void)build_world(scene);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
 
 }  // namespace piecework::runner

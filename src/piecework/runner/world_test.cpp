@@ -20,15 +20,6 @@ scene::Scene with_cloth(const std::string& cloth) {
       "t.json");
 }
 
-std::string refusal(const scene::Scene& scene) {
-  try {
-    (void)build_world(scene);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(World, BuildsWhatTheSceneSays) {
   const auto world = build_world(small_scene());
   EXPECT_EQ(world->model.num_vertices(), 56);
