@@ -2,7 +2,7 @@
 
 // The exact global solve as a tree: nested dissection, whose top cuts may be the borders of cloth
 // domains, gives an elimination tree; subtrees and tiles of large separators are worked on in
-// parallel. This is the recursive primal form at which [Lu25, Sec. 7.6 and Fig. 24] hints, with a
+// parallel. This is the recursive primal form at which [Lu25, Sec. 8 and Fig. 24] hints, with a
 // factor in block LDL^T form that both sweeps stream through.
 
 #include <cstddef>
