@@ -4,11 +4,11 @@
 // With the undivided factor it is the baseline kept for ever; any other exact solver takes the same
 // steps.
 
-#include <deque>
 #include <memory>
 
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/local/jacobi.hpp>
+#include <piecework/model/convergence.hpp>
 #include <piecework/model/reduction.hpp>
 #include <piecework/model/stepper.hpp>
 
@@ -31,26 +31,10 @@ class VanillaPd final : public model::Minimizer {
   [[nodiscard]] std::string description() const override;
 
  private:
-  /// Estimates the remaining error from the decay of the increments (docs/architecture.md, D9).
-  class ErrorEstimate {
-   public:
-    void add(double dx_inf);
-    [[nodiscard]] double value() const;
-
-   private:
-    static constexpr std::size_t kRatios = 3;
-    double last_ = 0;
-    std::deque<double> ratios_;
-  };
-
   void global_step(Positions& x, model::StepReport& report);
-  [[nodiscard]] double relative_gradient() const;
-  [[nodiscard]] bool converged(const model::StepReport& report) const;
 
   const model::ClothModel& model_;
-  model::StopOptions stop_;
-  double gravity_;
-  double unit_box_;  ///< largest extent of the start shape, m
+  model::Convergence convergence_;
   SparseMatrix K_;
   std::vector<char> fixed_;
   model::Reduction reduction_;
