@@ -25,6 +25,7 @@ class TreeExactSolver final : public ExactSolver {
   }
 
   [[nodiscard]] const FactorReport& report() const override { return tree_.report(); }
+  [[nodiscard]] TreeSolver* tree() override { return &tree_; }
   [[nodiscard]] std::string description() const override {
     const std::string& why = tree_.report().fallback;
     return why.empty() ? tree_.description() : tree_.description() + " because " + why;

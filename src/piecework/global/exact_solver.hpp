@@ -32,6 +32,9 @@ class ExactSolver {
   /// Of the last factor().
   [[nodiscard]] virtual const FactorReport& report() const = 0;
 
+  /// The tree behind it, for callers that go along with it (TreeSolver::solve_with()); or null.
+  [[nodiscard]] virtual TreeSolver* tree() { return nullptr; }
+
   /// One line for reports after factor(): libraries, orderings, precision and why, if not as asked.
   [[nodiscard]] virtual std::string description() const = 0;
 };

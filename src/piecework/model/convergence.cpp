@@ -17,17 +17,23 @@ double largest_extent(const Positions& start) {
 }  // namespace
 
 void ErrorEstimate::add(double dx_inf) {
-  if (last_ > 0) ratios_.push_back(dx_inf / last_);
-  if (ratios_.size() > kRatios) ratios_.pop_front();
-  last_ = dx_inf;
+  increments_.push_back(dx_inf);
+  if (increments_.size() > kSpan + 1) increments_.pop_front();
+}
+
+double ErrorEstimate::rate() const {
+  if (increments_.size() < 2) return 1;
+  if (increments_.front() == 0) return increments_.back() == 0 ? 0 : 0.999;
+  const auto span = static_cast<double>(increments_.size() - 1);
+  return std::min(0.999, std::pow(increments_.back() / increments_.front(), 1 / span));
 }
 
 double ErrorEstimate::value() const {
-  if (last_ == 0) return 0;
-  // Early increments fall fast, before the slow modes are all that is left: too few ratios flatter.
-  if (ratios_.size() < kRatios) return std::numeric_limits<double>::infinity();
-  const double q = std::min(0.999, *std::max_element(ratios_.begin(), ratios_.end()));
-  return q / (1.0 - q) * last_;
+  if (!increments_.empty() && increments_.back() == 0) return 0;  // nothing is left to do
+  if (increments_.size() < 2) return std::numeric_limits<double>::infinity();
+  const auto recent = increments_.end() - std::min<std::ptrdiff_t>(3, std::ssize(increments_));
+  const double q = rate();
+  return 2 * std::max(1.0, q / (1 - q)) * *std::max_element(recent, increments_.end());
 }
 
 Convergence::Convergence(const ClothModel& model, double gravity, StopOptions stop)
@@ -36,11 +42,9 @@ Convergence::Convergence(const ClothModel& model, double gravity, StopOptions st
       mean_edge_(model.mean_edge),
       nodal_weight_(model.mass.sum() / static_cast<double>(model.num_free()) * gravity) {}
 
-void Convergence::measure_increment(const Unknowns& dx, StepReport& report) {
-  const auto count = static_cast<std::size_t>(dx.rows());
-  const auto row_sq = [&](std::size_t i) {
-    return dx.row(static_cast<Eigen::Index>(i)).squaredNorm();
-  };
+template <class RowSquare>
+void Convergence::measure_increment(std::size_t count, const RowSquare& row_sq,
+                                    StepReport& report) {
   const double sum_sq = parallel_sum<double>(count, row_sq);
   report.dx_2 = std::sqrt(sum_sq) / unit_box_;
   report.dx_rms = count > 0 ? std::sqrt(sum_sq / static_cast<double>(count)) / unit_box_ : 0;
@@ -49,32 +53,72 @@ void Convergence::measure_increment(const Unknowns& dx, StepReport& report) {
   report.error = error_.value() * unit_box_ / mean_edge_;
 }
 
+void Convergence::measure_increment(const Unknowns& dx, StepReport& report) {
+  measure_increment(
+      static_cast<std::size_t>(dx.rows()),
+      [&](std::size_t i) { return dx.row(static_cast<Eigen::Index>(i)).squaredNorm(); }, report);
+}
+
+void Convergence::measure_increment(const Positions& dx, double step, StepReport& report) {
+  measure_increment(
+      static_cast<std::size_t>(dx.rows()),
+      [&](std::size_t i) {
+        return step * step * dx.row(static_cast<Eigen::Index>(i)).squaredNorm();
+      },
+      report);
+}
+
+template <class RowSquare>
+void Convergence::measure_gradient(std::size_t count, const RowSquare& row_sq,
+                                   StepReport& report) const {
+  const double sum_sq = parallel_sum<double>(count, row_sq);
+  report.gradient = count > 0 ? std::sqrt(sum_sq / static_cast<double>(count)) / nodal_weight_ : 0;
+}
+
 void Convergence::measure_gradient(const Reduction& reduction, const Positions& gradient,
                                    StepReport& report) const {
-  const auto count = static_cast<std::size_t>(reduction.count());
-  const double sum_sq = parallel_sum<double>(count, [&](std::size_t i) {
-    return reduction.row(gradient, static_cast<int>(i)).squaredNorm();
-  });
-  report.gradient = count > 0 ? std::sqrt(sum_sq / static_cast<double>(count)) / nodal_weight_ : 0;
+  measure_gradient(
+      static_cast<std::size_t>(reduction.count()),
+      [&](std::size_t i) { return reduction.row(gradient, static_cast<int>(i)).squaredNorm(); },
+      report);
+}
+
+void Convergence::measure_gradient(const Positions& reduced, StepReport& report) const {
+  measure_gradient(
+      static_cast<std::size_t>(reduced.rows()),
+      [&](std::size_t i) { return reduced.row(static_cast<Eigen::Index>(i)).squaredNorm(); },
+      report);
+}
+
+double Convergence::measure(const StepReport& report) const {
+  switch (stop_.rule) {
+    case StopRule::Error:
+      return report.error;
+    case StopRule::Gradient:
+      return report.gradient;
+    case StopRule::Dx2:
+      return report.dx_2;
+    case StopRule::DxRms:
+      return report.dx_rms;
+    case StopRule::DxInf:
+      return report.dx_inf;
+    case StopRule::Iterations:
+      break;
+  }
+  return std::numeric_limits<double>::infinity();
 }
 
 bool Convergence::reached(const StepReport& report) const {
   if (report.iterations < stop_.min_iterations) return false;
-  switch (stop_.rule) {
-    case StopRule::Error:
-      return report.error <= stop_.tolerance;
-    case StopRule::Gradient:
-      return report.gradient <= stop_.tolerance;
-    case StopRule::Dx2:
-      return report.dx_2 <= stop_.tolerance;
-    case StopRule::DxRms:
-      return report.dx_rms <= stop_.tolerance;
-    case StopRule::DxInf:
-      return report.dx_inf <= stop_.tolerance;
-    case StopRule::Iterations:
-      return report.iterations >= stop_.max_iterations;
-  }
-  return false;
+  if (stop_.rule == StopRule::Iterations) return report.iterations >= stop_.max_iterations;
+  return holds(report);
+}
+
+double Convergence::expected_iterations(const StepReport& report) const {
+  const double left = stop_.max_iterations - report.iterations;
+  if (stop_.rule == StopRule::Iterations) return left;
+  const double decay = -std::log(error_.rate());
+  return std::min(left, std::max(0.0, std::log(measure(report) / stop_.tolerance) / decay));
 }
 
 }  // namespace piecework::model

@@ -51,6 +51,19 @@ State Integrator::initial_state(const std::vector<Vec3>& part_velocity) const {
   return state;
 }
 
+bool Integrator::extrapolate_to(double end, const State& state) {
+  if (!minimizer_->wants_extrapolation() || state.previous_v.size() == 0) return false;
+  extrapolated_.resize(state.x.rows(), 3);
+  parallel_for(static_cast<std::size_t>(state.x.rows()), [&](std::size_t i) {
+    const auto v = static_cast<Eigen::Index>(i);
+    extrapolated_.row(v) =
+        state.x.row(v) + options_.h * (2 * state.v.row(v) - state.previous_v.row(v));
+  });
+  pins_.place(end, extrapolated_);
+  model_.sewing.follow(end, extrapolated_);
+  return true;
+}
+
 StepReport Integrator::step(State& state) {
   const Stopwatch total;
   Stopwatch phase;
@@ -72,9 +85,12 @@ StepReport Integrator::step(State& state) {
                     state.step + 1, h));
   x_ = predicted_;
   model_.sewing.settle(end, model_.mass, fixed, x_);  // where the iterations then stay
+  const bool extrapolate = extrapolate_to(end, state);
+  std::vector<double> memory = state.memory;
   double misc = phase.lap();
 
-  StepReport report = minimizer_->minimize({&predicted_, &fixed, &state.x}, x_);
+  StepReport report = minimizer_->minimize(
+      {&predicted_, &fixed, &state.x, extrapolate ? &extrapolated_ : nullptr, &memory, {}}, x_);
 
   phase.lap();
   if (!all_finite(x_) || !std::isfinite(report.energy))
@@ -83,6 +99,8 @@ StepReport Integrator::step(State& state) {
                     "use a smaller h or softer material",
                     state.step + 1, report.energy));
   model_.sewing.follow(end, x_);  // to the last bit
+  if (minimizer_->wants_extrapolation()) state.previous_v = state.v;
+  state.memory = std::move(memory);
   const double keep = options_.damping ? std::exp(-*options_.damping * h) : 1.0;
   parallel_for(rows, [&](std::size_t i) {
     const auto v = static_cast<Eigen::Index>(i);

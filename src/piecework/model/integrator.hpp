@@ -46,12 +46,15 @@ class Integrator {
   /// Vertices that are held, slaves of held carriers included.
   [[nodiscard]] std::vector<char> held_at(double time) const;
 
+  /// Fills extrapolated_; false if it is of no use, or the step before is not known.
+  bool extrapolate_to(double end, const State& state);
+
   const ClothModel& model_;
   ForceField forces_;
   PinScript pins_;
   IntegratorOptions options_;
   std::unique_ptr<Minimizer> minimizer_;
-  Positions acceleration_, predicted_, x_;
+  Positions acceleration_, predicted_, extrapolated_, x_;
 };
 
 }  // namespace piecework::model

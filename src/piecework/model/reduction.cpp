@@ -75,17 +75,43 @@ std::vector<DomainMatrix> Reduction::systems(std::span<const DomainMatrix> share
   return result;
 }
 
-void Reduction::advance(const Unknowns& increment, Positions& x) const {
-  parallel_for(static_cast<std::size_t>(count()), [&](std::size_t i) {
-    x.row(free_.vertex[i]) += increment.row(static_cast<Eigen::Index>(i));
-  });
+template <class Increment>
+void Reduction::advance_slaves(double step, const Increment& increment, Positions& x) const {
   const mesh::SeamMap& seams = model_->sewing.map();
   parallel_for(seams.slaves.size(), [&](std::size_t s) {
     Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
     seams.visit_carriers(seams.slaves[s], [&](int carrier, double weight) {
       if (number(carrier) >= 0) sum += weight * increment.row(number(carrier));
     });
-    x.row(seams.slaves[s]) += sum;
+    x.row(seams.slaves[s]) += step * sum;
+  });
+}
+
+void Reduction::advance(const Unknowns& increment, Positions& x) const {
+  parallel_for(static_cast<std::size_t>(count()), [&](std::size_t i) {
+    x.row(free_.vertex[i]) += increment.row(static_cast<Eigen::Index>(i));
+  });
+  advance_slaves(1.0, increment, x);
+}
+
+void Reduction::advance(const Positions& x, double step, const Positions& increment,
+                        Positions& out) const {
+  out.resize(x.rows(), 3);
+  parallel_for(free_.number.size(), [&](std::size_t v) {
+    const auto row = static_cast<Eigen::Index>(v);
+    const int unknown = free_.number[v];
+    if (unknown < 0)
+      out.row(row) = x.row(row);
+    else
+      out.row(row) = x.row(row) + step * increment.row(unknown);
+  });
+  advance_slaves(step, increment, out);
+}
+
+void Reduction::gather(const Positions& f, Positions& reduced) const {
+  reduced.resize(count(), 3);
+  parallel_for(static_cast<std::size_t>(count()), [&](std::size_t i) {
+    reduced.row(static_cast<Eigen::Index>(i)) = row(f, static_cast<int>(i));
   });
 }
 

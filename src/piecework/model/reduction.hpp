@@ -52,7 +52,15 @@ class Reduction {
   /// x += T_f dx_f, m. Parallel over unknowns and slaves.
   void advance(const Unknowns& increment, Positions& x) const;
 
+  /// out = x + step T_f dx_f, m; dx_f is n_f x 3.
+  void advance(const Positions& x, double step, const Positions& increment, Positions& out) const;
+
+  /// T_f^T f, n_f x 3; f is |V| x 3.
+  void gather(const Positions& f, Positions& reduced) const;
+
  private:
+  template <class Increment>
+  void advance_slaves(double step, const Increment& increment, Positions& x) const;
   [[nodiscard]] DomainMatrix folded_share(const DomainMatrix& share) const;
 
   const ClothModel* model_ = nullptr;

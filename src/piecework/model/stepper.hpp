@@ -2,6 +2,7 @@
 
 // What every time stepper shares: the state, the step's data and its report.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,10 @@ struct State {
   Positions v;      ///< |V| x 3, m/s
   double time = 0;  ///< s
   int step = 0;     ///< steps done
+  /// Velocities of the step before, m/s, for minimisers that extrapolate; else empty.
+  Positions previous_v;
+  /// What the minimiser remembers between steps, in its own terms; often empty.
+  std::vector<double> memory;
 };
 
 /// When the iteration of a step stops. Units of the tolerance in scene::Quality and docs/scene.md.
@@ -45,6 +50,9 @@ struct StepReport {
   double energy = 0;    ///< incremental potential E(x), J
   double dx_2 = 0, dx_rms = 0, dx_inf = 0;  ///< last increment in the unit box (the paper's rule)
   int global_solves = 0;
+  int evaluations = 0;     ///< of energy and gradient: local passes
+  int normal_factors = 0;  ///< factorisations of the metric's normal part
+  bool stalled = false;    ///< ended before the stop rule held: rounding allows no more progress
   int degenerate_projections = 0;  ///< triangles that needed the rank-deficient rule
   PhaseTimes phases;
   double step_ms = 0;
@@ -57,11 +65,23 @@ struct SetupReport {
   double factor_bytes = 0;
 };
 
+/// Called with the start (0 iterations) and after every iteration: for studies of convergence.
+using IterationObserver = std::function<void(const StepReport&, const Positions& x)>;
+
 /// The minimisation problem of one implicit Euler step [Lu25, Eq. 1].
 struct StepProblem {
   const Positions* predicted;      ///< z = x_n + h v_n + h^2 M^-1 f_ext, |V| x 3, m
   const std::vector<char>* fixed;  ///< per vertex: held; x already holds the prescribed position
   const Positions* previous;       ///< x_n; orients degenerate triangles
+  /// x_n + h v_n + h (v_n - v_{n-1}), on pins and seams: another start, or null. |V| x 3, m
+  const Positions* extrapolated = nullptr;
+  /// State::memory, to be read and renewed; null: none is kept.
+  std::vector<double>* memory = nullptr;
+  IterationObserver observer;  ///< usually empty
+
+  void observe(const StepReport& report, const Positions& x) const {
+    if (observer) observer(report, x);
+  }
 };
 
 /// Minimises the incremental potential; one implementation per method.
@@ -79,6 +99,9 @@ class Minimizer {
   /// Improves x (in: start of the iteration, out: the step's end state).
   /// \throws SimulationError if x becomes non-finite or K is not positive definite; x is then void.
   virtual StepReport minimize(const StepProblem& problem, Positions& x) = 0;
+
+  /// StepProblem::extrapolated is of use.
+  [[nodiscard]] virtual bool wants_extrapolation() const { return false; }
 
   /// One line for reports: libraries and orderings used.
   [[nodiscard]] virtual std::string description() const = 0;

@@ -19,20 +19,36 @@ namespace fs = std::filesystem;
 
 static_assert(std::endian::native == std::endian::little, "the format is little-endian");
 
-constexpr char kMagic[8] = {'P', 'W', 'S', 'T', 'A', 'T', 'E', '1'};
+constexpr char kMagic[8] = {'P', 'W', 'S', 'T', 'A', 'T', 'E', '2'};
 
-/// Fixed header; x and v follow, then a checksum of everything before it.
+/// Fixed header; x, v, what the next step looks back on, and a checksum of everything before it
+/// follow.
 struct Header {
   char magic[8];
   char hash[16];
   std::int64_t step;
   double time;
   std::int64_t vertices;
+  std::int64_t previous;  ///< rows of previous_v: vertices, or 0
+  std::int64_t memory;    ///< numbers
 };
-static_assert(sizeof(Header) == 48);
+static_assert(sizeof(Header) == 64);
 
-std::size_t state_bytes(std::int64_t vertices) {
-  return static_cast<std::size_t>(vertices) * 6 * sizeof(double);
+std::size_t position_bytes(std::int64_t rows) {
+  return static_cast<std::size_t>(rows) * 3 * sizeof(double);
+}
+
+/// Without header and checksum.
+std::size_t body_bytes(const Header& header) {
+  return 2 * position_bytes(header.vertices) + position_bytes(header.previous) +
+         static_cast<std::size_t>(header.memory) * sizeof(double);
+}
+
+/// The numbers of a file count what they say, so that sizes computed from them cannot overflow.
+bool is_plausible(const Header& header, std::size_t file_size) {
+  const auto limit = static_cast<std::int64_t>(file_size);
+  return header.vertices <= limit && header.memory >= 0 && header.memory <= limit &&
+         (header.previous == 0 || header.previous == header.vertices);
 }
 
 }  // namespace
@@ -82,12 +98,18 @@ void write_state(const fs::path& path, const model::State& state, const std::str
   header.step = state.step;
   header.time = state.time;
   header.vertices = state.x.rows();
-  std::string content(sizeof header + state_bytes(header.vertices), '\0');
-  char* out = content.data();
-  std::memcpy(out, &header, sizeof header);
-  const auto half = state_bytes(header.vertices) / 2;
-  std::memcpy(out + sizeof header, state.x.data(), half);
-  std::memcpy(out + sizeof header + half, state.v.data(), half);
+  header.previous = state.previous_v.rows();
+  header.memory = std::ssize(state.memory);
+  std::string content;
+  content.reserve(sizeof header + body_bytes(header));
+  const auto add = [&](const void* data, std::size_t bytes) {
+    content.append(static_cast<const char*>(data), bytes);
+  };
+  add(&header, sizeof header);
+  add(state.x.data(), position_bytes(header.vertices));
+  add(state.v.data(), position_bytes(header.vertices));
+  add(state.previous_v.data(), position_bytes(header.previous));
+  add(state.memory.data(), state.memory.size() * sizeof(double));
   content += Hash().add(content).hex();
   write_file_atomically(path, content);
 }
@@ -108,7 +130,8 @@ model::State read_state(const fs::path& path, const std::string& hash, int num_v
     throw damaged("belongs to another scene (its physics or mesh differ)");
   if (header.vertices != num_vertices)
     throw damaged("has another number of vertices than the scene");
-  if (content.size() != sizeof header + state_bytes(header.vertices) + kChecksum)
+  if (!is_plausible(header, content.size()) ||
+      content.size() != sizeof header + body_bytes(header) + kChecksum)
     throw damaged("is truncated");
   const std::string_view body(content.data(), content.size() - kChecksum);
   if (Hash().add(body).hex() != std::string_view(content).substr(body.size()))
@@ -117,11 +140,20 @@ model::State read_state(const fs::path& path, const std::string& hash, int num_v
   model::State state;
   state.step = static_cast<int>(header.step);
   state.time = header.time;
-  state.x.resize(num_vertices, 3);
-  state.v.resize(num_vertices, 3);
-  const auto half = state_bytes(header.vertices) / 2;
-  std::memcpy(state.x.data(), content.data() + sizeof header, half);
-  std::memcpy(state.v.data(), content.data() + sizeof header + half, half);
+  const char* next = content.data() + sizeof header;
+  const auto take = [&](void* data, std::size_t bytes) {
+    std::memcpy(data, next, bytes);
+    next += bytes;
+  };
+  const auto take_positions = [&](Positions& rows, std::int64_t count) {
+    rows.resize(count, 3);
+    if (count > 0) take(rows.data(), position_bytes(count));
+  };
+  take_positions(state.x, header.vertices);
+  take_positions(state.v, header.vertices);
+  take_positions(state.previous_v, header.previous);
+  state.memory.resize(static_cast<std::size_t>(header.memory));
+  if (header.memory > 0) take(state.memory.data(), state.memory.size() * sizeof(double));
   return state;
 }
 

@@ -20,7 +20,7 @@ std::string scene_hash(const scene::Scene& scene);
 /// shapes, triangles, held vertices).
 std::string motion_hash(const World& world);
 
-/// Writes step, time, x and v (double, bit for bit) with the scene's motion hash and a checksum.
+/// Writes the state (double, bit for bit) with the scene's motion hash and a checksum.
 /// \throws OutputError.
 void write_state(const std::filesystem::path& path, const model::State& state,
                  const std::string& hash);

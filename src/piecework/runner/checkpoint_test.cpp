@@ -45,6 +45,18 @@ TEST_F(Checkpoint, KeepsEveryBit) {
   EXPECT_TRUE(read.v == state.v);
   EXPECT_EQ(read.step, state.step);
   EXPECT_EQ(read.time, state.time);
+  EXPECT_EQ(read.previous_v.size(), 0);
+  EXPECT_TRUE(read.memory.empty());
+}
+
+TEST_F(Checkpoint, KeepsWhatTheNextStepLooksBackOn) {
+  model::State state = some_state();
+  state.previous_v = testing::random_positions(17, 1, 3);
+  state.memory = {4, 0.1};
+  write_state(file(), state, kHash);
+  const model::State read = read_state(file(), kHash, 17);
+  EXPECT_TRUE(read.previous_v == state.previous_v);
+  EXPECT_EQ(read.memory, state.memory);
 }
 
 TEST_F(Checkpoint, RefusesWhatIsNotTheSameRun) {

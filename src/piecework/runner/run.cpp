@@ -198,8 +198,12 @@ class Run {
 
   /// Writes the frame's files and shows it to the observer.
   void emit(const FrameRecord* frame) {
-    if (options_.save_states)
-      write_state(state_file(options_.directory, frame_), state_, record_.motion_hash);
+    if (options_.save_states) {
+      // To look at, not to go on from: without what the next step would look back on.
+      const model::State shown{
+          .x = state_.x, .v = state_.v, .time = state_.time, .step = state_.step};
+      write_state(state_file(options_.directory, frame_), shown, record_.motion_hash);
+    }
     export_frame(frame_, state_.x);
     observer_.frame_done(*world_, state_, frame_, frame);
   }

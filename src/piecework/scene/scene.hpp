@@ -129,7 +129,7 @@ struct Seam {
 };
 
 struct Solver {
-  std::string method = "vanilla_pd";
+  std::string method = "dd_pd";
   std::string global = "tree";
   std::string local = "jacobi";
   int domains = 32;
@@ -148,7 +148,9 @@ struct Quality {
   double tolerance = 1e-2;  ///< unit depends on stop; see the reference
   int max_iterations = 200;
   int min_iterations = 1;
-  std::string precision = "double";  ///< "double" | "single"
+  std::string accelerate = "lbfgs_kn";
+  int window = 5;                       ///< remembered iterates
+  std::string precision = "automatic";  ///< "automatic" | "double" | "single"
 
   bool operator==(const Quality&) const = default;
 };

@@ -336,10 +336,13 @@ void fields(V& v, Solver& s) {
   v.about("Solver",
           "How a step is solved; changes the speed, not the result "
           "that is approached.");
-  v.choice({"method", "time integrator"}, s.method,
-           {{"vanilla_pd",
-             "projective dynamics: local and global steps in "
-             "turn, not accelerated"}});
+  v.choice(
+      {"method", "time integrator"}, s.method,
+      {{"dd_pd",
+        "projective dynamics by domains, with an outer loop that `quality.accelerate` chooses"},
+       {"vanilla_pd",
+        "projective dynamics: local and global steps in "
+        "turn, not accelerated"}});
   v.choice({"global", "global solve"}, s.global,
            {{"tree",
              "exact and parallel: nested dissection whose top cuts are the borders of the domains"},
@@ -374,10 +377,9 @@ void fields(V& v, Quality& q) {
   v.about("Quality", "How accurately each step is solved.");
   v.choice({"stop", "rule that ends the iterations of a step"}, q.stop,
            {{"error",
-             "estimated position error q / (1 - q) * max |dx| <= "
-             "tolerance * mean edge length; dx is "
-             "the latest increment, q the largest of the last 3 "
-             "ratios of successive increments"},
+             "estimated position error 2 max(1, q / (1 - q)) |dx| <= tolerance * mean edge length; "
+             "|dx| is the largest of the last 3 increments of a vertex, q their mean decay over up "
+             "to 8 iterations"},
             {"gradient",
              "rms nodal force residual over free vertices <= "
              "tolerance * mean nodal weight"},
@@ -398,8 +400,23 @@ void fields(V& v, Quality& q) {
           q.max_iterations, between(1, 1e9));
   v.value({"min_iterations", "the rule is not asked before so many iterations"}, q.min_iterations,
           between(1, 1e9));
+  v.choice(
+      {"accelerate", "`method: dd_pd`: how a step gets from one iterate to the next"}, q.accelerate,
+      {{"lbfgs_kn",
+        "L-BFGS whose metric is the global solve and, in steps that would take many iterations "
+        "without it, a second matrix for motion along the normals, factored once per step: few "
+        "iterations for stiff and fine cloth as well"},
+       {"lbfgs", "L-BFGS whose metric is the global solve"},
+       {"anderson", "Anderson acceleration of local and global steps"},
+       {"chebyshev", "Chebyshev semi-iteration on local and global steps"},
+       {"none", "local and global steps in turn"}});
+  v.value({"window", "iterates that `accelerate: lbfgs_kn, lbfgs, anderson` remember"}, q.window,
+          between(1, 32));
   v.choice({"precision", "numbers in which `global: tree` stores its factor"}, q.precision,
-           {{"double", "64 bits: exact to rounding"},
+           {{"automatic",
+             "32 bits for `method: dd_pd`, where the factor shapes the way to the result and not "
+             "the result; else 64"},
+            {"double", "64 bits: exact to rounding"},
             {"single",
              "32 bits: half the memory and nearly half the time; each global step, solved for the "
              "increment, is exact to about 4 digits. Where that is not enough for the matrix, 64 "

@@ -177,7 +177,7 @@ TEST(SceneIo, NullSwitchesOff) {
   EXPECT_FALSE(scene.gravity || scene.wind || scene.damping || scene.materials.at("soft").bending);
   const std::string resolved = resolved_json(scene);
   EXPECT_NE(resolved.find("\"gravity\": null"), std::string::npos) << resolved;
-  EXPECT_EQ(resolved.find("wind"), std::string::npos);
+  EXPECT_EQ(resolved.find("\"wind\""), std::string::npos);
   EXPECT_FALSE(parse_scene(resolved, "s").gravity);
 }
 

@@ -1,0 +1,214 @@
+#include <piecework/pd/dd_pd.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <piecework/core/clock.hpp>
+#include <piecework/core/error.hpp>
+#include <piecework/model/assembly.hpp>
+
+namespace piecework::pd {
+namespace {
+
+constexpr double kArmijo = 1e-4;
+/// Energies closer than this, relative, are equal: their sum has rounded.
+constexpr double kEnergyRounding = 1e-13;
+constexpr int kMaxBacktracks = 30;
+/// Iterations that lower neither the energy by more than rounding nor the gradient by a tenth: no
+/// more is to be had.
+constexpr int kPatience = 15;
+constexpr double kProgress = 0.9;
+
+/// Iterations with K alone before it is judged.
+constexpr int kPlainIterations = 3;
+/// What the normal part costs: its factorisation, in iterations.
+constexpr double kIterationsPerFactor = 6;
+/// In a long step the normals turn; the pairs that L-BFGS remembers stay valid.
+constexpr int kIterationsPerRefresh = 15;
+/// A step with normals that took no more iterations might have done without.
+constexpr int kEasyIterations = 2;
+constexpr double kLongestWait = 16;  // steps between two attempts without normals
+
+// State::memory: {steps with normals from the start to go, how many the next time}. Empty: none.
+
+bool starts_with_normals(const std::vector<double>* memory) {
+  return memory && !memory->empty() && memory->front() > 0;
+}
+
+/// A step that needed normals makes the next ones start with them; whether they are needed still
+/// is tried again from time to time, less often after each vain attempt.
+void remember(const model::StepReport& report, std::vector<double>& memory) {
+  const bool started = starts_with_normals(&memory);
+  if (report.normal_factors == 0) {
+    memory.clear();
+  } else if (!started) {
+    const double wait = memory.empty() ? 1 : std::min(kLongestWait, 2 * memory.back());
+    memory = {wait, wait};
+  } else if (report.iterations <= kEasyIterations) {
+    memory.front() -= 1;
+  } else {
+    memory.front() = memory.back();  // far from doing without
+  }
+}
+
+}  // namespace
+
+DdPd::DdPd(const model::ClothModel& model, const DdPdOptions& options,
+           std::unique_ptr<global::ExactSolver> solver)
+    : model_(model),
+      options_(options),
+      convergence_(model, options.gravity, options.stop),
+      metric_(model, assemble_system(model, options.h), std::move(solver)),
+      acceleration_(make_acceleration(options.acceleration)),
+      local_(model, options.h) {}
+
+std::string DdPd::description() const {
+  return "DD-PD, " + metric_.solver().description();
+}
+
+void DdPd::prepare(const std::vector<char>& fixed) {
+  fixed_ = fixed;
+  metric_.prepare(fixed);
+}
+
+model::SetupReport DdPd::setup_report() const {
+  const global::FactorReport& report = metric_.solver().report();
+  return {report.analyze_ms + report.factor_ms, report.nonzeros, static_cast<double>(report.bytes)};
+}
+
+void DdPd::evaluate(Point& point, const model::StepProblem& problem, model::StepReport& report) {
+  const Stopwatch watch;
+  const auto result = local_.evaluate(point.x, problem, gradient_);
+  metric_.reduction().gather(gradient_, point.g);
+  point.energy = result.energy;
+  point.degenerate = result.degenerate;
+  ++report.evaluations;
+  report.phases.local += watch.elapsed_ms();
+}
+
+void DdPd::choose_start(const model::StepProblem& problem, const Positions& predicted,
+                        model::StepReport& report) {
+  now_.x = predicted;
+  evaluate(now_, problem, report);
+  if (!problem.extrapolated) return;
+  trial_.x = *problem.extrapolated;
+  evaluate(trial_, problem, report);
+  if (trial_.energy < now_.energy) std::swap(now_, trial_);
+}
+
+void DdPd::refresh_normals(model::StepReport& report) {
+  const Stopwatch watch;
+  metric_.refresh_normals(now_.x);
+  acceleration_->metric_changed();
+  ++report.normal_factors;
+  last_refresh_ = report.iterations;
+  report.phases.refactor = std::max(0.0, report.phases.refactor) + watch.elapsed_ms();
+}
+
+void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport& report) {
+  if (options_.normals == NormalPart::Never) return;
+  if (report.normal_factors > 0) {
+    if (report.iterations >= last_refresh_ + kIterationsPerRefresh) refresh_normals(report);
+    return;
+  }
+  const bool at_once = options_.normals == NormalPart::Always || starts_with_normals(memory);
+  const bool later = report.iterations >= kPlainIterations &&
+                     convergence_.expected_iterations(report) > kIterationsPerFactor;
+  if (at_once || later) refresh_normals(report);
+}
+
+bool DdPd::line_search(const model::StepProblem& problem, double slope,
+                       model::StepReport& report) {
+  const bool may_shorten = acceleration_->scalable() || acceleration_->fresh();
+  double step = 1;
+  for (int k = 0; k < (may_shorten ? kMaxBacktracks : 1); ++k) {
+    metric_.reduction().advance(now_.x, step, d_, trial_.x);
+    evaluate(trial_, problem, report);
+    const double trial_slope = dot(trial_.g, d_);
+    const bool lower = trial_.energy <= now_.energy + kArmijo * step * slope;
+    // Where energies differ by rounding only, the slopes still tell.
+    const double rounding = kEnergyRounding * std::abs(now_.energy);
+    const bool equal = trial_.energy <= now_.energy + rounding &&
+                       std::abs(trial_slope) <= (1 - 2 * kArmijo) * -slope;
+    if (lower || equal) {
+      if (trial_.energy < now_.energy - rounding) without_progress_ = 0;
+      acceleration_->accept(step, d_, now_.g, trial_.g);
+      convergence_.measure_increment(d_, step, report);
+      std::swap(now_, trial_);
+      return true;
+    }
+    // The minimum of the parabola through both slopes, kept within reason.
+    const double wanted = step * slope / (slope - trial_slope);
+    step = std::isfinite(wanted) ? std::clamp(wanted, 0.1 * step, 0.5 * step) : 0.1 * step;
+  }
+  return false;
+}
+
+/// One iteration; false if no direction leads down any more.
+bool DdPd::move(const model::StepProblem& problem, model::StepReport& report) {
+  const Stopwatch watch;
+  const double local_before = report.phases.local;
+  const auto finish = [&](bool moved) {
+    report.phases.global += watch.elapsed_ms() - (report.phases.local - local_before);
+    return moved;
+  };
+  for (;;) {
+    const bool fresh = acceleration_->fresh();
+    acceleration_->propose(now_.g, metric_, d_);
+    ++report.global_solves;
+    const double slope = dot(now_.g, d_);
+    if (slope < 0 && line_search(problem, slope, report)) return finish(true);
+    // What was remembered misled; -P g leads down unless rounding is all that is left.
+    if (fresh) return finish(false);
+    acceleration_->restart();
+  }
+}
+
+model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x) {
+  model::StepReport report;
+  report.phases.local = report.phases.global = 0;
+  if (fixed_ != *problem.fixed) {
+    const Stopwatch watch;
+    prepare(*problem.fixed);
+    report.phases.refactor = watch.elapsed_ms();
+  }
+  convergence_.begin();
+  acceleration_->restart();
+  metric_.drop_normals();
+  choose_start(problem, x, report);
+  convergence_.measure_gradient(now_.g, report);
+  report.energy = now_.energy;
+  problem.observe(report, now_.x);
+  without_progress_ = 0;
+  double best_gradient = report.gradient;
+  while (report.iterations < options_.stop.max_iterations && !report.converged &&
+         !report.stalled) {
+    consider_normals(problem.memory, report);
+    if (!move(problem, report)) {
+      convergence_.measure_increment(d_, 0.0, report);
+      report.converged = convergence_.holds(report);
+      report.stalled = !report.converged;
+      break;
+    }
+    ++report.iterations;
+    convergence_.measure_gradient(now_.g, report);
+    if (report.gradient < kProgress * best_gradient) {
+      best_gradient = report.gradient;
+      without_progress_ = 0;
+    }
+    report.energy = now_.energy;
+    problem.observe(report, now_.x);
+    report.converged = convergence_.reached(report);
+    report.stalled = !report.converged && ++without_progress_ > kPatience;
+  }
+  report.degenerate_projections = now_.degenerate;
+  if (options_.normals == NormalPart::Automatic && problem.memory)
+    remember(report, *problem.memory);
+  std::swap(x, now_.x);
+  return report;
+}
+
+}  // namespace piecework::pd

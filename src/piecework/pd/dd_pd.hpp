@@ -1,0 +1,80 @@
+#pragma once
+
+// The engine: projective dynamics by domains, whose outer loop converges on stiff, fine cloth too
+// (docs/convergence.md).
+
+#include <memory>
+#include <string>
+
+#include <piecework/local/jacobi.hpp>
+#include <piecework/model/convergence.hpp>
+#include <piecework/model/stepper.hpp>
+#include <piecework/pd/acceleration.hpp>
+#include <piecework/pd/metric.hpp>
+
+namespace piecework::pd {
+
+/// When the metric gets its normal part N Kn^-1 N^T.
+enum class NormalPart {
+  Never,
+  /// When more iterations without it are to be expected than its factorisation costs. A step
+  /// remembers how the step before went (State::memory), by counts only.
+  Automatic,
+  Always,
+};
+
+struct DdPdOptions {
+  double h = 1.0 / 120.0;  ///< s
+  double gravity = 9.81;   ///< magnitude that turns forces into weights for `gradient`, m/s^2
+  model::StopOptions stop;
+  AccelerationOptions acceleration;
+  NormalPart normals = NormalPart::Automatic;
+};
+
+/// Minimises the incremental potential E [Lu25, Eq. 1]: accelerated local-global iterations in
+/// increment form on the unknowns that pins and seams leave. From the better of the prediction z
+/// and the extrapolation of the last two steps; E never rises.
+class DdPd final : public model::Minimizer {
+ public:
+  /// \param model   must outlive this object  \param solver  of the global step
+  DdPd(const model::ClothModel& model, const DdPdOptions& options,
+       std::unique_ptr<global::ExactSolver> solver);
+
+  void prepare(const std::vector<char>& fixed) override;
+  [[nodiscard]] model::SetupReport setup_report() const override;
+  model::StepReport minimize(const model::StepProblem& problem, Positions& x) override;
+  [[nodiscard]] bool wants_extrapolation() const override { return true; }
+  [[nodiscard]] std::string description() const override;
+
+ private:
+  /// E and T^T grad E at x into a slot.
+  struct Point {
+    Positions x;  ///< |V| x 3, m
+    Positions g;  ///< n_f x 3, N
+    double energy = 0;
+    int degenerate = 0;
+  };
+
+  void evaluate(Point& point, const model::StepProblem& problem, model::StepReport& report);
+  void choose_start(const model::StepProblem& problem, const Positions& predicted,
+                    model::StepReport& report);
+  bool move(const model::StepProblem& problem, model::StepReport& report);
+  bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
+  void consider_normals(const std::vector<double>* memory, model::StepReport& report);
+  void refresh_normals(model::StepReport& report);
+
+  const model::ClothModel& model_;
+  DdPdOptions options_;
+  model::Convergence convergence_;
+  std::vector<char> fixed_;
+  Metric metric_;
+  std::unique_ptr<Acceleration> acceleration_;
+  local::JacobiStep local_;
+  int last_refresh_ = 0;      ///< iteration of the step
+  int without_progress_ = 0;  ///< iterations
+  Point now_, trial_;
+  Positions gradient_;  ///< |V| x 3
+  Positions d_;         ///< n_f x 3
+};
+
+}  // namespace piecework::pd
