@@ -1,21 +1,14 @@
 #pragma once
 
-// Instruction sets that the kernels are built for.
+// Instruction sets under the names by which users of the solvers know them.
 
-#include <string>
-#include <vector>
+#include <piecework/core/isa.hpp>
 
 namespace piecework::global {
 
-enum class Isa { Portable, Avx2, Avx512 };
-
-/// The best one that this processor (and operating system) runs.
-Isa best_isa();
-
-/// All that this processor runs, best first.
-std::vector<Isa> available_isas();
-
-/// "AVX-512", "AVX2", "portable".
-std::string to_string(Isa isa);
+using piecework::available_isas;
+using piecework::best_isa;
+using piecework::Isa;
+using piecework::to_string;
 
 }  // namespace piecework::global

@@ -1,10 +1,13 @@
 #include <piecework/local/jacobi.hpp>
 
+#include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/model/projection.hpp>
+
+#include "patch_kernels.hpp"
+#include "patches.hpp"
 
 namespace piecework::local {
 namespace {
@@ -25,107 +28,161 @@ Mat32 reference_isometry(const model::StretchConstraint& c, const Positions& pre
   return reference;
 }
 
-mesh::Adjacency corners_of_vertices(const model::ClothModel& model) {
-  mesh::Adjacency corners;
-  corners.begin.assign(static_cast<std::size_t>(model.num_vertices()) + 1, 0);
-  for (const Triangle& triangle : model.triangles)
-    for (const int v : triangle) ++corners.begin[static_cast<std::size_t>(v) + 1];
-  std::partial_sum(corners.begin.begin(), corners.begin.end(), corners.begin.begin());
-  corners.item.resize(static_cast<std::size_t>(corners.begin.back()));
-  std::vector<int> cursor(corners.begin.begin(), corners.begin.end() - 1);
-  for (std::size_t t = 0; t < model.triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k)
-      corners.item[static_cast<std::size_t>(
-          cursor[static_cast<std::size_t>(model.triangles[t][k])]++)] = static_cast<int>(3 * t + k);
-  return corners;
+struct alignas(64) Line {
+  double number[8];
+};
+
+/// What one thread works in: it stays in the nearest cache from patch to patch.
+struct Scratch {
+  std::vector<Line> x, force;  ///< rows of four numbers, two per line
+  std::vector<int> degenerate;
+
+  void reserve(const Patches& patches) {
+    const auto lines = static_cast<std::size_t>(patches.max_vertices + 1) / 2;
+    const auto slots = static_cast<std::size_t>(patches.max_batches) * kLanes;
+    if (x.size() < lines) {
+      x.resize(lines);
+      force.resize(lines);
+    }
+    if (degenerate.size() < slots) degenerate.resize(slots);
+  }
+};
+
+Scratch& scratch_of_thread(const Patches& patches) {
+  static thread_local Scratch scratch;
+  scratch.reserve(patches);
+  return scratch;
 }
 
 }  // namespace
 
-JacobiStep::JacobiStep(const model::ClothModel& model, double h)
-    : model_(model),
-      inverse_h_sq_(1.0 / (h * h)),
-      corner_force_(3 * static_cast<Eigen::Index>(model.stretch.size()), 3),
-      bend_force_(static_cast<Eigen::Index>(model.bend.size()), 3),
-      vertex_corners_(corners_of_vertices(model)) {
-  bend_begin_.assign(static_cast<std::size_t>(model.num_vertices()) + 1, 0);
-  for (const model::BendConstraint& c : model.bend)
-    for (const int v : c.vertices) ++bend_begin_[static_cast<std::size_t>(v) + 1];
-  std::partial_sum(bend_begin_.begin(), bend_begin_.end(), bend_begin_.begin());
-  bend_use_.resize(static_cast<std::size_t>(bend_begin_.back()));
-  std::vector<int> cursor(bend_begin_.begin(), bend_begin_.end() - 1);
-  for (std::size_t i = 0; i < model.bend.size(); ++i)
-    for (std::size_t k = 0; k < 4; ++k)
-      bend_use_[static_cast<std::size_t>(
-          cursor[static_cast<std::size_t>(model.bend[i].vertices[k])]++)] = {
-          static_cast<int>(i), model.bend[i].coefficient[k]};
-}
+struct JacobiStep::Impl {
+  struct Sum {
+    double energy = 0;
+    int degenerate = 0;
+  };
+  struct Call {
+    const Positions& x;
+    const model::StepProblem& problem;
+    Positions& gradient;
+  };
+
+  Impl(const model::ClothModel& m, double h, Isa isa)
+      : model(m),
+        inverse_h_sq(1.0 / (h * h)),
+        patches(m),
+        kernels(patch_kernels(isa)),
+        partial(static_cast<std::size_t>(patches.num_partials)),
+        sums(patches.patches.size()) {
+    inertia.reserve(patches.vertex.size());
+    for (const int v : patches.vertex) inertia.push_back(model.mass[v] * inverse_h_sq);
+  }
+
+  Sum run_patch(const Patch& patch, const Call& call);
+  Sum add_degenerate(const Patch& patch, const Degenerate& list, const Call& call,
+                     double* force) const;
+  double join_rim(std::size_t i, const Call& call) const;
+
+  const model::ClothModel& model;
+  double inverse_h_sq;
+  Patches patches;
+  const PatchKernels& kernels;
+  std::vector<double> inertia;           ///< m / h^2 of patches.vertex, N/m
+  std::vector<Eigen::Vector4d> partial;  ///< forces of each patch on the vertices of its rim, N
+  std::vector<Sum> sums;                 ///< per patch
+};
+
+JacobiStep::JacobiStep(const model::ClothModel& model, double h, Isa isa)
+    : impl_(std::make_unique<Impl>(model, h, isa)) {}
+JacobiStep::~JacobiStep() = default;
+JacobiStep::JacobiStep(JacobiStep&&) noexcept = default;
 
 JacobiStep::Result JacobiStep::evaluate(const Positions& x, const model::StepProblem& problem,
                                         Positions& gradient) {
   gradient.resize(x.rows(), 3);
-  const Sum stretch = parallel_sum<Sum>(
-      model_.stretch.size(), [&](std::size_t t) { return project_triangle(t, x, problem); });
-  const double bend =
-      parallel_sum<double>(model_.bend.size(), [&](std::size_t i) { return project_bend(i, x); });
-  const double inertia =
-      parallel_sum<double>(static_cast<std::size_t>(x.rows()),
-                           [&](std::size_t v) { return gather(v, x, problem, gradient); });
-  return {stretch.energy + bend + inertia, stretch.degenerate};
-}
-
-JacobiStep::Sum JacobiStep::project_triangle(std::size_t t, const Positions& x,
-                                             const model::StepProblem& problem) {
-  const model::StretchConstraint& c = model_.stretch[t];
-  const Mat32 F = deformation_gradient(c, x);
-  Mat32 R;
-  const bool degenerate = !model::closest_isometry(F, R);
-  if (degenerate)
-    R = model::closest_isometry_degenerate(F,
-                                           reference_isometry(c, *problem.previous, model_.start));
-  const Mat32 stress = c.weight * (F - R);
-  const auto row = 3 * static_cast<Eigen::Index>(t);
-  const Eigen::RowVector3d force1 = c.rest_inverse.row(0) * stress.transpose();
-  const Eigen::RowVector3d force2 = c.rest_inverse.row(1) * stress.transpose();
-  corner_force_.row(row) = -(force1 + force2);
-  corner_force_.row(row + 1) = force1;
-  corner_force_.row(row + 2) = force2;
-  return {0.5 * c.weight * (F - R).squaredNorm(), degenerate};
-}
-
-double JacobiStep::project_bend(std::size_t i, const Positions& x) {
-  const model::BendConstraint& c = model_.bend[i];
-  // The coefficients sum to zero, so differences to one vertex keep the accuracy.
-  Vec3 curvature = Vec3::Zero();
-  for (std::size_t k = 1; k < 4; ++k)
-    curvature += c.coefficient[k] * (x.row(c.vertices[k]) - x.row(c.vertices[0])).transpose();
-  if (c.rest_length > 0) {
-    const double length = curvature.norm();
-    // A curved hinge that is momentarily flat has no direction to aim at: it waits.
-    if (length > 1e-12 * c.rest_length) curvature *= 1.0 - c.rest_length / length;
+  const Impl::Call call{x, problem, gradient};
+  const std::vector<Patch>& patches = impl_->patches.patches;
+  parallel_for(
+      patches.size(), [&](std::size_t p) { impl_->sums[p] = impl_->run_patch(patches[p], call); },
+      1);
+  Result result;
+  for (const Impl::Sum& sum : impl_->sums) {
+    result.energy += sum.energy;
+    result.degenerate += sum.degenerate;
   }
-  bend_force_.row(static_cast<Eigen::Index>(i)) = (c.weight * curvature).transpose();
-  return 0.5 * c.weight * curvature.squaredNorm();
+  result.energy += parallel_sum<double>(impl_->patches.rim.size(),
+                                        [&](std::size_t i) { return impl_->join_rim(i, call); });
+  return result;
 }
 
-double JacobiStep::gather(std::size_t v, const Positions& x, const model::StepProblem& problem,
-                          Positions& gradient) const {
-  const auto row = static_cast<Eigen::Index>(v);
-  if ((*problem.fixed)[v]) {
-    gradient.row(row).setZero();
+JacobiStep::Impl::Sum JacobiStep::Impl::run_patch(const Patch& patch, const Call& call) {
+  Scratch& scratch = scratch_of_thread(patches);
+  double* x = scratch.x.front().number;
+  double* force = scratch.force.front().number;
+  const int* vertices = patches.vertex.data() + patch.first_vertex;
+  const auto numbers = 4 * static_cast<std::size_t>(patch.num_vertices);
+  kernels.gather(call.x.data(), vertices, patch.num_vertices, x);
+  std::fill_n(force, numbers, 0.0);
+
+  Degenerate degenerate{scratch.degenerate.data(), 0};
+  double energy = kernels.triangles(patches.batches.data() + patch.first_batch,
+                                    patches.corners.data() + patch.first_batch, patch.num_batches,
+                                    x, force, degenerate);
+  Sum sum = add_degenerate(patch, degenerate, call, force);
+  if (patch.num_flat > 0)
+    energy += kernels.flat(patches.flat.data() + patch.first_flat, patch.num_flat, x, force);
+  if (patch.num_curved > 0)
+    energy +=
+        kernels.curved(patches.curved.data() + patch.first_curved, patch.num_curved, x, force);
+  energy += kernels.finish({vertices, patch.num_inner, inertia.data() + patch.first_vertex,
+                            call.problem.predicted->data(), call.problem.fixed->data()},
+                           x, force, call.gradient.data());
+  if (patch.num_inner < patch.num_vertices)
+    std::copy(force + 4 * patch.num_inner, force + numbers,
+              partial[static_cast<std::size_t>(patch.first_partial)].data());
+  sum.energy += energy;
+  return sum;
+}
+
+JacobiStep::Impl::Sum JacobiStep::Impl::add_degenerate(const Patch& patch, const Degenerate& list,
+                                                       const Call& call, double* force) const {
+  Sum sum;
+  for (int i = 0; i < list.count; ++i) {
+    const int slot = list.slot[i];
+    const auto batch = static_cast<std::size_t>(patch.first_batch + slot / kLanes);
+    const int t = patches.triangle[static_cast<std::size_t>(kLanes * patch.first_batch + slot)];
+    if (t < 0) continue;  // the last batch has room left
+    const model::StretchConstraint& c = model.stretch[static_cast<std::size_t>(t)];
+    const Mat32 F = deformation_gradient(c, call.x);
+    const Mat32 R = model::closest_isometry_degenerate(
+        F, reference_isometry(c, *call.problem.previous, model.start));
+    const Mat32 forces = c.weight * (F - R) * c.rest_inverse.transpose();
+    const auto at = [&](std::size_t k) {
+      return Eigen::Map<Vec3>(force + patches.corners[batch].corner[k][slot % kLanes]);
+    };
+    at(0) -= forces.col(0) + forces.col(1);
+    at(1) += forces.col(0);
+    at(2) += forces.col(1);
+    sum.energy += 0.5 * c.weight * (F - R).squaredNorm();
+    ++sum.degenerate;
+  }
+  return sum;
+}
+
+double JacobiStep::Impl::join_rim(std::size_t i, const Call& call) const {
+  const int v = patches.rim[i];
+  if ((*call.problem.fixed)[static_cast<std::size_t>(v)] != 0) {
+    call.gradient.row(v).setZero();
     return 0;
   }
-  const Vec3 offset = (x.row(row) - problem.predicted->row(row)).transpose();
-  const double inertia = model_.mass[row] * inverse_h_sq_;
-  Vec3 force = inertia * offset;
-  for (int k = vertex_corners_.begin[v]; k < vertex_corners_.begin[v + 1]; ++k)
-    force += corner_force_.row(vertex_corners_.item[static_cast<std::size_t>(k)]).transpose();
-  for (int k = bend_begin_[v]; k < bend_begin_[v + 1]; ++k) {
-    const BendUse& use = bend_use_[static_cast<std::size_t>(k)];
-    force += use.coefficient * bend_force_.row(use.constraint).transpose();
-  }
-  gradient.row(row) = force.transpose();
-  return 0.5 * inertia * offset.squaredNorm();
+  const Vec3 offset = (call.x.row(v) - call.problem.predicted->row(v)).transpose();
+  const double stiffness = model.mass[v] * inverse_h_sq;
+  Vec3 force = stiffness * offset;
+  for (int k = patches.partial_begin[i]; k < patches.partial_begin[i + 1]; ++k)
+    force +=
+        partial[static_cast<std::size_t>(patches.partial[static_cast<std::size_t>(k)])].head<3>();
+  call.gradient.row(v) = force.transpose();
+  return 0.5 * stiffness * offset.squaredNorm();
 }
 
 }  // namespace piecework::local
