@@ -9,22 +9,6 @@
 namespace piecework::local {
 namespace {
 
-Mat32 deformation_gradient(const model::StretchConstraint& c, const Positions& x) {
-  Mat32 edges;
-  edges.col(0) = (x.row(c.vertices[1]) - x.row(c.vertices[0])).transpose();
-  edges.col(1) = (x.row(c.vertices[2]) - x.row(c.vertices[0])).transpose();
-  return edges * c.rest_inverse;
-}
-
-/// Orientation for a degenerate triangle: at the start of the step, else in the start shape.
-Mat32 reference_isometry(const model::StretchConstraint& c, const Positions& previous,
-                         const Positions& start) {
-  Mat32 reference = Mat32::Identity();
-  if (!model::closest_isometry(deformation_gradient(c, previous), reference))
-    model::closest_isometry(deformation_gradient(c, start), reference);
-  return reference;
-}
-
 mesh::Adjacency corners_of_vertices(const model::ClothModel& model) {
   mesh::Adjacency corners;
   corners.begin.assign(static_cast<std::size_t>(model.num_vertices()) + 1, 0);
@@ -77,12 +61,9 @@ JacobiStep::Result JacobiStep::evaluate(const Positions& x, const model::StepPro
 JacobiStep::Sum JacobiStep::project_triangle(std::size_t t, const Positions& x,
                                              const model::StepProblem& problem) {
   const model::StretchConstraint& c = model_.stretch[t];
-  const Mat32 F = deformation_gradient(c, x);
+  const Mat32 F = model::deformation_gradient(c, x);
   Mat32 R;
-  const bool degenerate = !model::closest_isometry(F, R);
-  if (degenerate)
-    R = model::closest_isometry_degenerate(F,
-                                           reference_isometry(c, *problem.previous, model_.start));
+  const bool degenerate = model::project_stretch(c, F, *problem.previous, model_.start, R);
   const Mat32 stress = c.weight * (F - R);
   const auto row = 3 * static_cast<Eigen::Index>(t);
   const Eigen::RowVector3d force1 = c.rest_inverse.row(0) * stress.transpose();
@@ -99,13 +80,16 @@ double JacobiStep::project_bend(std::size_t i, const Positions& x) {
   Vec3 curvature = Vec3::Zero();
   for (std::size_t k = 1; k < 4; ++k)
     curvature += c.coefficient[k] * (x.row(c.vertices[k]) - x.row(c.vertices[0])).transpose();
+  double missing = curvature.norm();  // |c^T x - y|
   if (c.rest_length > 0) {
-    const double length = curvature.norm();
-    // A curved hinge that is momentarily flat has no direction to aim at: it waits.
+    const double length = missing;
+    missing = std::abs(length - c.rest_length);
+    // A curved hinge that is momentarily flat has no direction to aim at: it waits, and its energy
+    // is the one that it has nearby.
     if (length > 1e-12 * c.rest_length) curvature *= 1.0 - c.rest_length / length;
   }
   bend_force_.row(static_cast<Eigen::Index>(i)) = (c.weight * curvature).transpose();
-  return 0.5 * c.weight * curvature.squaredNorm();
+  return 0.5 * c.weight * missing * missing;
 }
 
 double JacobiStep::gather(std::size_t v, const Positions& x, const model::StepProblem& problem,
