@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
+#include <piecework/baselines/newton.hpp>
 #include <piecework/baselines/vanilla_pd.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/model/integrator.hpp>
@@ -122,6 +123,43 @@ TEST(SewnCloth, APinOnASlaveHoldsTheSeam) {
   for (const int v : {2, 5, 8, 9, 12, 15, 18, 21})
     EXPECT_TRUE(motion.state.x.row(v) == model.start.row(v)) << v;
   EXPECT_LT(motion.state.x(23, 1), -0.01);
+}
+
+// One step of the patches with T-junctions, from a prediction that is off the minimum everywhere.
+struct SewnStep {
+  SewnStep() : fixed(static_cast<std::size_t>(model.num_vertices()), 0) {
+    fixed[0] = fixed[12] = 1;
+    z += testing::random_positions(model.num_vertices(), 0.005, 17);
+    start = z;
+    model.sewing.settle(0, model.mass, fixed, start);
+    for (const int v : {0, 12}) z.row(v) = start.row(v) = model.start.row(v);
+    model.sewing.follow(0, start);
+  }
+  /// Where a method ends, with a gradient of at most 1e-9.
+  [[nodiscard]] Positions end(model::Minimizer& method) const {
+    Positions x = start;
+    const auto report = method.minimize({&z, &fixed, &model.start}, x);
+    EXPECT_TRUE(report.converged) << report.gradient;
+    return x;
+  }
+  model::ClothModel model = sewn_model(testing::four_patches());
+  Positions z = model.start;
+  Positions start;
+  std::vector<char> fixed;
+};
+
+constexpr model::StopOptions kTight{model::StopRule::Gradient, 1e-9, 20000, 1};
+
+TEST(SewnCloth, NewtonFindsTheMinimumOfProjectiveDynamics) {
+  const SewnStep step;
+  VanillaPd pd(step.model, kH, 9.81, kTight);
+  const Positions expected = step.end(pd);
+  ASSERT_GT((expected - step.start).cwiseAbs().maxCoeff(), 1e-3) << "it moves";
+  for (const auto linear : {NewtonLinear::Cholmod, NewtonLinear::Pcg})
+    for (const auto hessian : {model::HessianForm::Projected, model::HessianForm::Unprojected}) {
+      Newton newton(step.model, kH, 9.81, kTight, {hessian, linear});
+      EXPECT_LT((step.end(newton) - expected).cwiseAbs().maxCoeff(), 1e-7);
+    }
 }
 
 }  // namespace

@@ -63,15 +63,15 @@ StepReport VanillaPd::minimize(const model::StepProblem& problem, Positions& x) 
     report.phases.local += watch.lap();
   };
   evaluate();
-  problem.observe(report, x);
-  while (report.iterations < convergence_.stop().max_iterations && !report.converged) {
+  bool go_on = problem.observe(report, x);
+  while (go_on && report.iterations < convergence_.stop().max_iterations && !report.converged) {
     watch.lap();
     global_step(x, report);
     ++report.iterations;
     ++report.global_solves;
     report.phases.global += watch.lap();
     evaluate();
-    problem.observe(report, x);
+    go_on = problem.observe(report, x);
     report.converged = convergence_.reached(report);
     if (!std::isfinite(report.energy)) break;  // the integrator refuses the state
   }

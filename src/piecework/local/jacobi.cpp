@@ -12,22 +12,6 @@
 namespace piecework::local {
 namespace {
 
-Mat32 deformation_gradient(const model::StretchConstraint& c, const Positions& x) {
-  Mat32 edges;
-  edges.col(0) = (x.row(c.vertices[1]) - x.row(c.vertices[0])).transpose();
-  edges.col(1) = (x.row(c.vertices[2]) - x.row(c.vertices[0])).transpose();
-  return edges * c.rest_inverse;
-}
-
-/// Orientation for a degenerate triangle: at the start of the step, else in the start shape.
-Mat32 reference_isometry(const model::StretchConstraint& c, const Positions& previous,
-                         const Positions& start) {
-  Mat32 reference = Mat32::Identity();
-  if (!model::closest_isometry(deformation_gradient(c, previous), reference))
-    model::closest_isometry(deformation_gradient(c, start), reference);
-  return reference;
-}
-
 struct alignas(64) Line {
   double number[8];
 };
@@ -153,9 +137,9 @@ JacobiStep::Impl::Sum JacobiStep::Impl::add_degenerate(const Patch& patch, const
     const int t = patches.triangle[static_cast<std::size_t>(kLanes * patch.first_batch + slot)];
     if (t < 0) continue;  // the last batch has room left
     const model::StretchConstraint& c = model.stretch[static_cast<std::size_t>(t)];
-    const Mat32 F = deformation_gradient(c, call.x);
-    const Mat32 R = model::closest_isometry_degenerate(
-        F, reference_isometry(c, *call.problem.previous, model.start));
+    const Mat32 F = model::deformation_gradient(c, call.x);
+    Mat32 R;
+    model::project_stretch(c, F, *call.problem.previous, model.start, R);
     const Mat32 forces = c.weight * (F - R) * c.rest_inverse.transpose();
     const auto at = [&](std::size_t k) {
       return Eigen::Map<Vec3>(force + patches.corners[batch].corner[k][slot % kLanes]);

@@ -133,18 +133,21 @@ struct PatchLoops {
 
   static double curved(const CurvedHinge* hinges, int count, const double* x, double* force) {
     Row energy = S::row_zero();
+    double waiting = 0;
     for (int i = 0; i < count; ++i) {
       HingeRows r = read(hinges[i].hinge, x);
+      const double rest = hinges[i].rest_length;
       const double length = S::root_of(S::norm_sq(r.value));
-      // A curved hinge that is momentarily flat has no direction to aim at: it waits.
-      const double factor = length > 1e-12 * hinges[i].rest_length
-                                ? 1.0 - hinges[i].rest_length / length
-                                : 1.0;
+      // A curved hinge that is momentarily flat has no direction to aim at: it waits, and its
+      // energy is the one that it has nearby.
+      const bool aims = length > 1e-12 * rest;
+      const double factor = aims ? 1.0 - rest / length : 1.0;
+      if (!aims) waiting += rest * rest;
       r.value = S::row_mul(S::repeat_row(&factor), r.value);
       energy = S::row_fma(r.value, r.value, energy);
       write(hinges[i].hinge, r, force);
     }
-    return 0.5 * S::row_total(energy);
+    return 0.5 * (S::row_total(energy) + waiting);
   }
 
   static void gather(const double* x, const int* vertex, int count, double* rows) {

@@ -52,8 +52,8 @@ class Bisection {
     }
     Eigen::Index axis = 0;
     (high - low).maxCoeff(&axis);
-    const int middle = begin + static_cast<int>(static_cast<std::int64_t>(end - begin) *
-                                                (parts / 2) / parts);
+    const int middle =
+        begin + static_cast<int>(static_cast<std::int64_t>(end - begin) * (parts / 2) / parts);
     std::nth_element(first, item_.begin() + middle, last, [&](int a, int b) {
       const double at_a = center_(a, axis);
       const double at_b = center_(b, axis);
@@ -95,8 +95,7 @@ FlatHinge make_hinge(const model::BendConstraint& c, const std::vector<int>& num
 template <class Place>
 void spread(const std::vector<int>& items, const Place& place) {
   const std::size_t rounds = (items.size() + kLanes - 1) / kLanes;
-  for (std::size_t i = 0; i < items.size(); ++i)
-    place(items[i], i % rounds * kLanes + i / rounds);
+  for (std::size_t i = 0; i < items.size(); ++i) place(items[i], i % rounds * kLanes + i / rounds);
 }
 
 /// The same as a list without holes.
@@ -209,9 +208,8 @@ Patches::Patches(const model::ClothModel& model) {
   std::vector<int> number(uses.size(), -1);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<int>& own = vertices[g];
-    const auto rim_begin = std::stable_partition(own.begin(), own.end(), [&](int v) {
-      return uses[static_cast<std::size_t>(v)] == 1;
-    });
+    const auto rim_begin = std::stable_partition(
+        own.begin(), own.end(), [&](int v) { return uses[static_cast<std::size_t>(v)] == 1; });
     Patch patch;
     patch.first_vertex = static_cast<int>(vertex.size());
     patch.num_vertices = static_cast<int>(own.size());

@@ -50,4 +50,21 @@ Mat32 closest_isometry_degenerate(const Mat32& F, const Mat32& reference) {
   return u1 * V.col(0).transpose() + u2 * V.col(1).transpose();
 }
 
+Mat32 deformation_gradient(const StretchConstraint& c, const Positions& x) {
+  Mat32 edges;
+  edges.col(0) = (x.row(c.vertices[1]) - x.row(c.vertices[0])).transpose();
+  edges.col(1) = (x.row(c.vertices[2]) - x.row(c.vertices[0])).transpose();
+  return edges * c.rest_inverse;
+}
+
+bool project_stretch(const StretchConstraint& c, const Mat32& F, const Positions& previous,
+                     const Positions& start, Mat32& R) {
+  if (closest_isometry(F, R)) return false;
+  Mat32 reference = Mat32::Identity();
+  if (!closest_isometry(deformation_gradient(c, previous), reference))
+    closest_isometry(deformation_gradient(c, start), reference);
+  R = closest_isometry_degenerate(F, reference);
+  return true;
+}
+
 }  // namespace piecework::model

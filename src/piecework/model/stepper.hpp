@@ -65,8 +65,9 @@ struct SetupReport {
   double factor_bytes = 0;
 };
 
-/// Called with the start (0 iterations) and after every iteration: for studies of convergence.
-using IterationObserver = std::function<void(const StepReport&, const Positions& x)>;
+/// Called with the start (0 iterations) and after every iteration, before the stop rule is asked;
+/// false ends the step. For studies of convergence.
+using IterationObserver = std::function<bool(const StepReport&, const Positions& x)>;
 
 /// The minimisation problem of one implicit Euler step [Lu25, Eq. 1].
 struct StepProblem {
@@ -79,8 +80,9 @@ struct StepProblem {
   std::vector<double>* memory = nullptr;
   IterationObserver observer;  ///< usually empty
 
-  void observe(const StepReport& report, const Positions& x) const {
-    if (observer) observer(report, x);
+  /// False: the observer has seen enough.
+  [[nodiscard]] bool observe(const StepReport& report, const Positions& x) const {
+    return !observer || observer(report, x);
   }
 };
 

@@ -40,8 +40,7 @@ TEST(Lbfgs, IsTheBfgsUpdateOfTheMetric) {
     P.col(i) = -flat(s.descend(unit));
   }
   constexpr int kWindow = 3;
-  const auto acceleration =
-      make_acceleration({.kind = AccelerationKind::Lbfgs, .window = kWindow});
+  const auto acceleration = make_acceleration({.kind = AccelerationKind::Lbfgs, .window = kWindow});
   std::vector<std::pair<Eigen::VectorXd, Eigen::VectorXd>> pairs;
   Positions g = testing::random_positions(s.count(), 1, 1);
   for (int k = 0; k < 8; ++k) {
@@ -77,8 +76,8 @@ TEST(Anderson, SolvesLinearProblemsInAsManyStepsAsTheyHaveDimensions) {
   constexpr int kGroups = 4;
   const Eigen::Index size = 3 * s.count();
   Eigen::MatrixXd groups = Eigen::MatrixXd::Random(size, kGroups);
-  const SparseMatrix K = s.metric.reduction().system(
-      model::assemble_system(s.cloth.model, JoltedCloth::kH));
+  const SparseMatrix K =
+      s.metric.reduction().system(model::assemble_system(s.cloth.model, JoltedCloth::kH));
   const auto K_times = [&](const Eigen::VectorXd& u) {
     const Positions rows = Eigen::Map<const Positions>(u.data(), s.count(), 3);
     return flat(Positions(K * rows));

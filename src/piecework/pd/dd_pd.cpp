@@ -65,9 +65,7 @@ DdPd::DdPd(const model::ClothModel& model, const DdPdOptions& options,
       acceleration_(make_acceleration(options.acceleration)),
       local_(model, options.h) {}
 
-std::string DdPd::description() const {
-  return "DD-PD, " + metric_.solver().description();
-}
+std::string DdPd::description() const { return "DD-PD, " + metric_.solver().description(); }
 
 void DdPd::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;
@@ -120,8 +118,7 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
   if (at_once || later) refresh_normals(report);
 }
 
-bool DdPd::line_search(const model::StepProblem& problem, double slope,
-                       model::StepReport& report) {
+bool DdPd::line_search(const model::StepProblem& problem, double slope, model::StepReport& report) {
   const bool may_shorten = acceleration_->scalable() || acceleration_->fresh();
   double step = 1;
   for (int k = 0; k < (may_shorten ? kMaxBacktracks : 1); ++k) {
@@ -181,10 +178,10 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   choose_start(problem, x, report);
   convergence_.measure_gradient(now_.g, report);
   report.energy = now_.energy;
-  problem.observe(report, now_.x);
+  bool go_on = problem.observe(report, now_.x);
   without_progress_ = 0;
   double best_gradient = report.gradient;
-  while (report.iterations < options_.stop.max_iterations && !report.converged &&
+  while (go_on && report.iterations < options_.stop.max_iterations && !report.converged &&
          !report.stalled) {
     consider_normals(problem.memory, report);
     if (!move(problem, report)) {
@@ -200,7 +197,7 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
       without_progress_ = 0;
     }
     report.energy = now_.energy;
-    problem.observe(report, now_.x);
+    go_on = problem.observe(report, now_.x);
     report.converged = convergence_.reached(report);
     report.stalled = !report.converged && ++without_progress_ > kPatience;
   }

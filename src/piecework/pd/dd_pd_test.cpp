@@ -80,6 +80,7 @@ TEST_P(EveryWay, LeadsToTheSameMinimumAndEnergyNeverRises) {
     EXPECT_EQ(x.rows(), cloth.z.rows());
     last = report.energy;
     ++calls;
+    return true;
   };
   Positions x = cloth.z;
   const auto report = solver.minimize(problem, x);
@@ -176,6 +177,7 @@ TEST(DdPd, StartsFromTheBetterOfPredictionAndExtrapolation) {
     double energy = 0;
     problem.observer = [&](const model::StepReport& report, const Positions&) {
       if (report.iterations == 0) energy = report.energy;
+      return true;
     };
     Positions x = cloth.z;
     EXPECT_TRUE(solver.minimize(problem, x).converged);

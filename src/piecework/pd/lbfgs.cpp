@@ -9,7 +9,7 @@
 namespace piecework::pd {
 namespace {
 
-constexpr std::size_t kBlock = 2048;   // numbers per step of a pass
+constexpr std::size_t kBlock = 2048;  // numbers per step of a pass
 constexpr std::size_t kMaxWindow = 32;
 
 /// Sums of a pass, one per slot.

@@ -88,7 +88,8 @@ void NormalMatrix::list_uses(const model::Reduction& reduction) {
               [](const Use& a, const Use& b) { return a.unknown < b.unknown; });
     uses_.insert(uses_.end(), uses.begin(), uses.end());
     use_begin_.push_back(static_cast<int>(uses_.size()));
-    pair_begin_.push_back(pair_begin_.back() + static_cast<int>(uses.size() * (uses.size() + 1) / 2));
+    pair_begin_.push_back(pair_begin_.back() +
+                          static_cast<int>(uses.size() * (uses.size() + 1) / 2));
   }
   pair_value_.resize(at(pair_begin_.back()));
 }
@@ -132,9 +133,9 @@ void NormalMatrix::find_normals(const Positions& x) {
   parallel_for(static_cast<std::size_t>(reduction_.count()), [&](std::size_t i) {
     const Eigen::RowVector3d sum = reduction_.row(vertex_normal_, static_cast<int>(i));
     const double length = sum.norm();
-    normals_.row(static_cast<Eigen::Index>(i)) =
-        length > 1e-200 && std::isfinite(length) ? Eigen::RowVector3d(sum / length)
-                                                 : Eigen::RowVector3d(0, 1, 0);
+    normals_.row(static_cast<Eigen::Index>(i)) = length > 1e-200 && std::isfinite(length)
+                                                     ? Eigen::RowVector3d(sum / length)
+                                                     : Eigen::RowVector3d(0, 1, 0);
   });
 }
 

@@ -52,11 +52,11 @@ class NormalMatrix {
   const model::ClothModel& model_;
   const model::Reduction& reduction_;
   const SparseMatrix& K_;
-  std::vector<int> use_begin_;  ///< per triangle: offsets into uses_
-  std::vector<Use> uses_;       ///< ascending unknowns for each triangle
-  std::vector<int> pair_begin_;  ///< per triangle: offsets into pair_value_
+  std::vector<int> use_begin_;      ///< per triangle: offsets into uses_
+  std::vector<Use> uses_;           ///< ascending unknowns for each triangle
+  std::vector<int> pair_begin_;     ///< per triangle: offsets into pair_value_
   std::vector<double> pair_value_;  ///< per triangle and pair of its uses i >= j, N/m
-  mesh::Adjacency entry_pairs_;  ///< per entry of K~: which pair_value_ belong to it
+  mesh::Adjacency entry_pairs_;     ///< per entry of K~: which pair_value_ belong to it
   mesh::Adjacency vertex_triangles_;
   Positions triangle_normal_;  ///< per triangle, twice its area long, m^2
   Positions vertex_normal_;    ///< |V| x 3, sums of the above

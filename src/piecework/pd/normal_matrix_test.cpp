@@ -66,8 +66,8 @@ struct Assembled {
 
 /// Everything stretched, so that nothing needs to be clamped and the projected Hessian is exact.
 Positions stretched(const JoltedCloth& cloth) {
-  Positions x = 1.3 * cloth.rest.positions +
-                testing::random_positions(cloth.rest.num_vertices(), 0.002, 3);
+  Positions x =
+      1.3 * cloth.rest.positions + testing::random_positions(cloth.rest.num_vertices(), 0.002, 3);
   for (int v = 0; v < x.rows(); ++v) x(v, 1) += 0.3 * x(v, 0) * x(v, 2);
   return x;
 }
@@ -107,8 +107,8 @@ TEST(NormalMatrix, WithSeamsAsWell) {
 TEST(NormalMatrix, StaysPositiveDefiniteAndBelowKUnderCompression) {
   const JoltedCloth cloth(testing::grid_mesh(6, 6, 0.3), testing::cotton(1e-4), 0);
   for (const double scale : {0.9, 0.3, 1e-3}) {
-    const Positions x = scale * cloth.rest.positions +
-                        testing::random_positions(36, 0.02 * scale, 5);
+    const Positions x =
+        scale * cloth.rest.positions + testing::random_positions(36, 0.02 * scale, 5);
     const Assembled a(cloth.model, cloth.fixed, x);
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> kn(a.Kn);
     EXPECT_GT(kn.eigenvalues()[0], 0) << scale;
