@@ -89,8 +89,10 @@ StepReport Integrator::step(State& state) {
   std::vector<double> memory = state.memory;
   double misc = phase.lap();
 
-  StepReport report = minimizer_->minimize(
-      {&predicted_, &fixed, &state.x, extrapolate ? &extrapolated_ : nullptr, &memory, {}}, x_);
+  const StepProblem problem{&predicted_, &fixed, &state.x,
+                            extrapolate ? &extrapolated_ : nullptr, &memory, {}};
+  if (observer_) observer_(problem);
+  StepReport report = minimizer_->minimize(problem, x_);
 
   phase.lap();
   if (!all_finite(x_) || !std::isfinite(report.energy))

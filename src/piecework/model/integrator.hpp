@@ -2,8 +2,10 @@
 
 // Implicit Euler around any minimiser: prediction, pins, minimisation, velocities.
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include <piecework/model/constraints.hpp>
 #include <piecework/model/forces.hpp>
@@ -40,6 +42,9 @@ class Integrator {
   /// velocity of each part.
   [[nodiscard]] State initial_state(const std::vector<Vec3>& part_velocity) const;
 
+  /// Called with the problem of each step before it is solved: for studies.
+  void observe(std::function<void(const StepProblem&)> observer) { observer_ = std::move(observer); }
+
   [[nodiscard]] const Minimizer& minimizer() const { return *minimizer_; }
 
  private:
@@ -54,6 +59,7 @@ class Integrator {
   PinScript pins_;
   IntegratorOptions options_;
   std::unique_ptr<Minimizer> minimizer_;
+  std::function<void(const StepProblem&)> observer_;
   Positions acceleration_, predicted_, extrapolated_, x_;
 };
 

@@ -191,29 +191,6 @@ pd::AccelerationOptions acceleration(const scene::Quality& quality) {
   return options;
 }
 
-std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
-  const scene::Scene& scene = world.scene;
-  constexpr double kStandardGravity = 9.81;  // m/s^2: turns forces into weights where there is none
-  const double magnitude = world.forces.gravity ? world.forces.gravity->norm() : 0;
-  const double gravity = magnitude > 0 ? magnitude : kStandardGravity;
-  const model::StopOptions stop{.rule = stop_rule(scene.quality.stop),
-                                .tolerance = scene.quality.tolerance,
-                                .max_iterations = scene.quality.max_iterations,
-                                .min_iterations = scene.quality.min_iterations};
-  if (scene.solver.method == "vanilla_pd")
-    return std::make_unique<baselines::VanillaPd>(world.model, scene.step.h, gravity, stop,
-                                                  make_exact_solver(world));
-  return std::make_unique<pd::DdPd>(
-      world.model,
-      pd::DdPdOptions{.h = scene.step.h,
-                      .gravity = gravity,
-                      .stop = stop,
-                      .acceleration = acceleration(scene.quality),
-                      .normals = scene.quality.accelerate == "lbfgs_kn" ? pd::NormalPart::Automatic
-                                                                        : pd::NormalPart::Never},
-      make_exact_solver(world));
-}
-
 }  // namespace
 
 decomposition::Elements World::elements() const {
@@ -307,6 +284,29 @@ std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
     domains.vertex_node = world.domains.vertex_node;
   }
   return global::make_tree_solver(std::move(domains), {.precision = tree_precision(world.scene)});
+}
+
+std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
+  const scene::Scene& scene = world.scene;
+  constexpr double kStandardGravity = 9.81;  // m/s^2: turns forces into weights where there is none
+  const double magnitude = world.forces.gravity ? world.forces.gravity->norm() : 0;
+  const double gravity = magnitude > 0 ? magnitude : kStandardGravity;
+  const model::StopOptions stop{.rule = stop_rule(scene.quality.stop),
+                                .tolerance = scene.quality.tolerance,
+                                .max_iterations = scene.quality.max_iterations,
+                                .min_iterations = scene.quality.min_iterations};
+  if (scene.solver.method == "vanilla_pd")
+    return std::make_unique<baselines::VanillaPd>(world.model, scene.step.h, gravity, stop,
+                                                  make_exact_solver(world));
+  return std::make_unique<pd::DdPd>(
+      world.model,
+      pd::DdPdOptions{.h = scene.step.h,
+                      .gravity = gravity,
+                      .stop = stop,
+                      .acceleration = acceleration(scene.quality),
+                      .normals = scene.quality.accelerate == "lbfgs_kn" ? pd::NormalPart::Automatic
+                                                                        : pd::NormalPart::Never},
+      make_exact_solver(world));
 }
 
 std::unique_ptr<model::Integrator> make_integrator(const World& world) {

@@ -56,6 +56,9 @@ mesh::MeshDocument load_mesh(const scene::Mesh& mesh);
 /// The exact global solve that the scene asks for, not yet factored. \pre `world` outlives it.
 std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world);
 
+/// The method that the scene asks for. \pre `world` outlives it.
+std::unique_ptr<model::Minimizer> make_minimizer(const World& world);
+
 /// The integrator that the scene asks for. \pre `world` outlives it.
 std::unique_ptr<model::Integrator> make_integrator(const World& world);
 
