@@ -55,8 +55,7 @@ void HangingSheet::solve(Positions x) {
   scene::Scene& scene = world_->scene;
   scene.quality.tolerance = 1e-14;  // until rounding ends it
   solution_ = std::move(x);
-  model::StepReport report =
-      runner::make_minimizer(*world_)->minimize(problem(), solution_);
+  model::StepReport report = runner::make_minimizer(*world_)->minimize(problem(), solution_);
   if (world_->model.num_vertices() <= kMostForNewton) {
     // No reference of ours alone: Newton's method shares nothing with the engine.
     const double ours = report.energy;

@@ -119,10 +119,15 @@ class Anderson final : public Acceleration {
 }  // namespace
 
 double dot(const Positions& a, const Positions& b) {
-  return parallel_sum<double>(static_cast<std::size_t>(a.rows()), [&](std::size_t i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    return a.row(row).dot(b.row(row));
-  });
+  constexpr std::size_t kBlock = 4096;
+  static const OuterKernels& kernels = outer_kernels(best_isa());
+  const auto size = static_cast<std::size_t>(a.size());
+  return parallel_sum<double>((size + kBlock - 1) / kBlock,
+                              [&](std::size_t block) {
+                                return kernels.dot(a.data(), b.data(), block * kBlock,
+                                                   std::min(size, (block + 1) * kBlock));
+                              },
+                              1);
 }
 
 std::unique_ptr<Acceleration> make_acceleration(const AccelerationOptions& options) {

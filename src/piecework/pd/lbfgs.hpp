@@ -2,12 +2,15 @@
 
 // L-BFGS with the metric P as initial inverse Hessian.
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include <piecework/pd/acceleration.hpp>
+
+#include "kernels.hpp"
 
 namespace piecework::pd {
 
@@ -16,6 +19,8 @@ namespace piecework::pd {
 /// vectors are kept in 32 bits: they shape the path, not the end.
 class Lbfgs final : public Acceleration {
  public:
+  static constexpr std::size_t kMaxWindow = 32;
+
   explicit Lbfgs(int window);
 
   void restart() override;
@@ -29,7 +34,16 @@ class Lbfgs final : public Acceleration {
   [[nodiscard]] bool scalable() const override { return true; }
 
  private:
+  /// Remembered vectors, oldest first.
+  struct Remembered {
+    std::array<const float*, kMaxWindow + 1> row{};
+    int count = 0;
+  };
+
   [[nodiscard]] std::size_t free_slot() const;
+  /// Drops the i-th oldest pair.
+  void forget(Eigen::Index i);
+  [[nodiscard]] Remembered remembered(const std::vector<std::vector<float>>& rows) const;
   [[nodiscard]] Eigen::VectorXd products(const std::vector<std::vector<float>>& rows,
                                          const Positions& with) const;
   void combine(const Positions& base, double factor, const std::vector<std::vector<float>>& rows,
@@ -38,9 +52,10 @@ class Lbfgs final : public Acceleration {
   std::size_t window_;
   std::vector<std::vector<float>> s_, y_;  ///< per slot (one more than the window), 3 n_f numbers
   std::vector<std::size_t> order_;         ///< slots, oldest first
-  Eigen::MatrixXd sy_;                     ///< by slot: s_i . y_j for i not newer than j
-  Eigen::VectorXd s_dot_g_;                ///< by slot, with the newest gradient
+  Eigen::MatrixXd sy_;                     ///< s_i . y_j, by age, for i not newer than j
+  Eigen::VectorXd s_dot_g_;                ///< by age, with the newest gradient
   Positions q_;
+  const OuterKernels& kernels_;
 };
 
 }  // namespace piecework::pd

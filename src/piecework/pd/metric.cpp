@@ -63,7 +63,7 @@ void Metric::solve_stretch(const Positions& g, Positions& d) {
 void Metric::apply(const Positions& g, Positions& d) {
   d.resize(g.rows(), 3);
   if (!normals_in_use_) return solve_stretch(g, d);
-  const Positions& N = normal_->normals();
+  const auto N = normal_->normals();
   const auto count = static_cast<std::size_t>(g.rows());
   along_normal_.resize(g.rows());
   parallel_for(count, [&](std::size_t i) {

@@ -1,11 +1,16 @@
 #include <piecework/pd/normal_matrix.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <vector>
 
 #include <piecework/core/parallel.hpp>
+#include <piecework/mesh/topology.hpp>
 #include <piecework/model/projection.hpp>
+
+#include "kernels.hpp"
 
 namespace piecework::pd {
 namespace {
@@ -47,142 +52,243 @@ bool softening(const Mat32& F, Softening& result) {
   return result.B.allFinite();
 }
 
+/// What an unknown contributes to a triangle's deformation gradient: F += x_u G^T.
+struct Use {
+  int unknown;
+  Vec2 G;
+};
+
+/// A triangle with slaves of seams: its corners hang on more than three unknowns.
+struct SewnTriangle {
+  int triangle;
+  int first_use, num_uses;
+  int first_pair;
+};
+
 }  // namespace
 
-NormalMatrix::NormalMatrix(const model::ClothModel& model, const model::Reduction& reduction,
-                           const SparseMatrix& K)
-    : model_(model),
-      reduction_(reduction),
-      K_(K),
-      vertex_triangles_(mesh::vertex_triangles(model.triangles, model.num_vertices())),
-      triangle_normal_(static_cast<Eigen::Index>(model.stretch.size()), 3),
-      vertex_normal_(model.num_vertices(), 3),
-      normals_(reduction.count(), 3),
-      values_(static_cast<std::size_t>(K.nonZeros()), 0.0) {
-  list_uses(reduction);
-  list_pairs();
-}
-
-void NormalMatrix::list_uses(const model::Reduction& reduction) {
-  use_begin_.reserve(model_.stretch.size() + 1);
-  use_begin_.push_back(0);
-  pair_begin_.push_back(0);
-  std::vector<Use> uses;
-  for (const model::StretchConstraint& c : model_.stretch) {
-    const Vec2 G1 = c.rest_inverse.row(0).transpose();
-    const Vec2 G2 = c.rest_inverse.row(1).transpose();
-    const std::array<Vec2, 3> G{-(G1 + G2), G1, G2};
-    uses.clear();
-    for (std::size_t k = 0; k < 3; ++k)
-      model_.sewing.map().visit_carriers(c.vertices[k], [&](int carrier, double weight) {
-        const int unknown = reduction.number(carrier);
-        if (unknown < 0) return;
-        const auto same = std::find_if(uses.begin(), uses.end(),
-                                       [&](const Use& use) { return use.unknown == unknown; });
-        if (same == uses.end())
-          uses.push_back({unknown, weight * G[k]});
-        else
-          same->G += weight * G[k];
-      });
-    std::sort(uses.begin(), uses.end(),
-              [](const Use& a, const Use& b) { return a.unknown < b.unknown; });
-    uses_.insert(uses_.end(), uses.begin(), uses.end());
-    use_begin_.push_back(static_cast<int>(uses_.size()));
-    pair_begin_.push_back(pair_begin_.back() +
-                          static_cast<int>(uses.size() * (uses.size() + 1) / 2));
+struct NormalMatrix::Impl {
+  Impl(const model::ClothModel& m, const model::Reduction& r, const SparseMatrix& k, Isa isa)
+      : model(m),
+        reduction(r),
+        K(k),
+        kernels(outer_kernels(isa)),
+        vertex_triangles(mesh::vertex_triangles(m.triangles, m.num_vertices())),
+        triangle_normal(static_cast<Eigen::Index>(m.stretch.size()), 3),
+        vertex_normal(m.num_vertices(), 3),
+        normals(Positions::Zero(r.count() + 1, 3)),
+        values(static_cast<std::size_t>(k.nonZeros()), 0.0) {
+    sort_triangles();
+    list_pairs();
   }
-  pair_value_.resize(at(pair_begin_.back()));
+
+  void sort_triangles();
+  void add_plain(std::size_t t);
+  void add_sewn(std::size_t t);
+  void list_pairs();
+  template <class Visit>
+  void visit_pairs(const Visit& visit) const;
+  void find_normals(const Positions& x);
+  void fill_sewn(const SewnTriangle& sewn, const Positions& x);
+  void gather_column(std::size_t column);
+
+  const model::ClothModel& model;
+  const model::Reduction& reduction;
+  const SparseMatrix& K;
+  const OuterKernels& kernels;
+  std::vector<NormalBatch> batches;  ///< triangles without slaves
+  int in_last_batch = kLanes;        ///< used lanes
+  std::vector<SewnTriangle> sewn;
+  std::vector<Use> uses;
+  std::vector<double> pair_value;  ///< of the batches, then of sewn triangles, N/m
+  mesh::Adjacency entry_pairs;     ///< per entry of K~: which pair_value belong to it
+  mesh::Adjacency vertex_triangles;
+  Positions triangle_normal;  ///< per triangle, twice its area long, m^2
+  Positions vertex_normal;    ///< |V| x 3, sums of the above
+  Positions normals;          ///< N, and a row of zeros for held vertices
+  std::vector<double> values;
+};
+
+NormalMatrix::NormalMatrix(const model::ClothModel& model, const model::Reduction& reduction,
+                           const SparseMatrix& K, Isa isa)
+    : impl_(std::make_unique<Impl>(model, reduction, K, isa)) {}
+NormalMatrix::~NormalMatrix() = default;
+
+Eigen::Map<const Positions> NormalMatrix::normals() const {
+  return {impl_->normals.data(), impl_->reduction.count(), 3};
 }
 
-void NormalMatrix::list_pairs() {
-  std::vector<int> entry_of_pair(pair_value_.size());
-  parallel_for(model_.stretch.size(), [&](std::size_t t) {
-    int pair = pair_begin_[t];
-    for (int i = use_begin_[t]; i < use_begin_[t + 1]; ++i)
-      for (int j = use_begin_[t]; j <= i; ++j) {
-        const int column = uses_[at(j)].unknown;
-        const int* first = K_.innerIndexPtr() + K_.outerIndexPtr()[column];
-        const int* last = K_.innerIndexPtr() + K_.outerIndexPtr()[column + 1];
-        entry_of_pair[at(pair++)] = static_cast<int>(
-            std::lower_bound(first, last, uses_[at(i)].unknown) - K_.innerIndexPtr());
-      }
+void NormalMatrix::Impl::sort_triangles() {
+  const mesh::SeamMap& seams = model.sewing.map();
+  const auto is_sewn = [&](std::size_t t) {
+    const Triangle& v = model.stretch[t].vertices;
+    return std::any_of(v.begin(), v.end(), [&](int vertex) { return seams.is_slave(vertex); });
+  };
+  for (std::size_t t = 0; t < model.stretch.size(); ++t)
+    if (!is_sewn(t)) add_plain(t);
+  pair_value.resize(batches.size() * kPairs * kLanes);
+  for (std::size_t t = 0; t < model.stretch.size(); ++t)
+    if (is_sewn(t)) add_sewn(t);
+}
+
+void NormalMatrix::Impl::add_plain(std::size_t t) {
+  if (in_last_batch == kLanes) {
+    batches.emplace_back(NormalBatch{});
+    // Lanes that stay free: any triangle without weight.
+    for (int k = 0; k < 3; ++k)
+      std::fill_n(batches.back().unknown[k], kLanes, 3 * reduction.count());
+    in_last_batch = 0;
+  }
+  NormalBatch& batch = batches.back();
+  const model::StretchConstraint& c = model.stretch[t];
+  const int lane = in_last_batch++;
+  batch.weight[lane] = c.weight;
+  for (int k = 0; k < 4; ++k) batch.inverse[k][lane] = c.rest_inverse(k / 2, k % 2);
+  for (int k = 0; k < 3; ++k) {
+    const int number = reduction.number(c.vertices[at(k)]);
+    batch.vertex[k][lane] = 3 * c.vertices[at(k)];
+    batch.unknown[k][lane] = 3 * (number < 0 ? reduction.count() : number);
+  }
+}
+
+void NormalMatrix::Impl::add_sewn(std::size_t t) {
+  const model::StretchConstraint& c = model.stretch[t];
+  const Vec2 G1 = c.rest_inverse.row(0).transpose();
+  const Vec2 G2 = c.rest_inverse.row(1).transpose();
+  const std::array<Vec2, 3> G{-(G1 + G2), G1, G2};
+  const auto first = static_cast<std::ptrdiff_t>(uses.size());
+  for (std::size_t k = 0; k < 3; ++k)
+    model.sewing.map().visit_carriers(c.vertices[k], [&](int carrier, double weight) {
+      const int unknown = reduction.number(carrier);
+      if (unknown < 0) return;
+      const auto same = std::find_if(uses.begin() + first, uses.end(),
+                                     [&](const Use& use) { return use.unknown == unknown; });
+      if (same == uses.end())
+        uses.push_back({unknown, weight * G[k]});
+      else
+        same->G += weight * G[k];
+    });
+  const int count = static_cast<int>(std::ssize(uses) - first);
+  sewn.push_back(
+      {static_cast<int>(t), static_cast<int>(first), count, static_cast<int>(pair_value.size())});
+  pair_value.resize(pair_value.size() + static_cast<std::size_t>(count * (count + 1) / 2));
+}
+
+/// Calls visit(unknown, unknown, index into pair_value).
+template <class Visit>
+void NormalMatrix::Impl::visit_pairs(const Visit& visit) const {
+  for (std::size_t b = 0; b < batches.size(); ++b)
+    for (int lane = 0; lane < kLanes; ++lane) {
+      int pair = static_cast<int>(b) * kPairs * kLanes + lane;
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j <= i; ++j, pair += kLanes)
+          visit(batches[b].unknown[i][lane] / 3, batches[b].unknown[j][lane] / 3, pair);
+    }
+  for (const SewnTriangle& s : sewn) {
+    int pair = s.first_pair;
+    for (int i = 0; i < s.num_uses; ++i)
+      for (int j = 0; j <= i; ++j, ++pair)
+        visit(uses[at(s.first_use + i)].unknown, uses[at(s.first_use + j)].unknown, pair);
+  }
+}
+
+void NormalMatrix::Impl::list_pairs() {
+  std::vector<int> entry_of_pair(pair_value.size(), -1);
+  entry_pairs.begin.assign(values.size() + 1, 0);
+  visit_pairs([&](int a, int b, int pair) {
+    const auto [column, row] = std::minmax(a, b);
+    if (row == reduction.count()) return;  // a held vertex
+    const int* first = K.innerIndexPtr() + K.outerIndexPtr()[column];
+    const int* last = K.innerIndexPtr() + K.outerIndexPtr()[column + 1];
+    const auto entry = std::lower_bound(first, last, row) - K.innerIndexPtr();
+    entry_of_pair[at(pair)] = static_cast<int>(entry);
+    ++entry_pairs.begin[static_cast<std::size_t>(entry) + 1];
   });
-  entry_pairs_.begin.assign(values_.size() + 1, 0);
-  for (const int entry : entry_of_pair) ++entry_pairs_.begin[at(entry) + 1];
-  std::partial_sum(entry_pairs_.begin.begin(), entry_pairs_.begin.end(),
-                   entry_pairs_.begin.begin());
-  entry_pairs_.item.resize(entry_of_pair.size());
-  std::vector<int> cursor(entry_pairs_.begin.begin(), entry_pairs_.begin.end() - 1);
+  std::partial_sum(entry_pairs.begin.begin(), entry_pairs.begin.end(), entry_pairs.begin.begin());
+  entry_pairs.item.resize(at(entry_pairs.begin.back()));
+  std::vector<int> cursor(entry_pairs.begin.begin(), entry_pairs.begin.end() - 1);
   for (std::size_t pair = 0; pair < entry_of_pair.size(); ++pair)
-    entry_pairs_.item[at(cursor[at(entry_of_pair[pair])]++)] = static_cast<int>(pair);
+    if (entry_of_pair[pair] >= 0)
+      entry_pairs.item[at(cursor[at(entry_of_pair[pair])]++)] = static_cast<int>(pair);
 }
 
-void NormalMatrix::find_normals(const Positions& x) {
-  parallel_for(model_.triangles.size(), [&](std::size_t t) {
-    const Triangle& v = model_.triangles[t];
+void NormalMatrix::Impl::find_normals(const Positions& x) {
+  parallel_for(model.triangles.size(), [&](std::size_t t) {
+    const Triangle& v = model.triangles[t];
     const Vec3 e1 = (x.row(v[1]) - x.row(v[0])).transpose();
     const Vec3 e2 = (x.row(v[2]) - x.row(v[0])).transpose();
-    triangle_normal_.row(static_cast<Eigen::Index>(t)) = e1.cross(e2).transpose();
+    triangle_normal.row(static_cast<Eigen::Index>(t)) = e1.cross(e2).transpose();
   });
-  parallel_for(static_cast<std::size_t>(model_.num_vertices()), [&](std::size_t v) {
+  parallel_for(static_cast<std::size_t>(model.num_vertices()), [&](std::size_t v) {
     Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-    for (int k = vertex_triangles_.begin[v]; k < vertex_triangles_.begin[v + 1]; ++k)
-      sum += triangle_normal_.row(vertex_triangles_.item[at(k)]);
-    vertex_normal_.row(static_cast<Eigen::Index>(v)) = sum;
+    for (int k = vertex_triangles.begin[v]; k < vertex_triangles.begin[v + 1]; ++k)
+      sum += triangle_normal.row(vertex_triangles.item[at(k)]);
+    vertex_normal.row(static_cast<Eigen::Index>(v)) = sum;
   });
-  parallel_for(static_cast<std::size_t>(reduction_.count()), [&](std::size_t i) {
-    const Eigen::RowVector3d sum = reduction_.row(vertex_normal_, static_cast<int>(i));
+  parallel_for(static_cast<std::size_t>(reduction.count()), [&](std::size_t i) {
+    const Eigen::RowVector3d sum = reduction.row(vertex_normal, static_cast<int>(i));
     const double length = sum.norm();
-    normals_.row(static_cast<Eigen::Index>(i)) = length > 1e-200 && std::isfinite(length)
-                                                     ? Eigen::RowVector3d(sum / length)
-                                                     : Eigen::RowVector3d(0, 1, 0);
+    normals.row(static_cast<Eigen::Index>(i)) = length > 1e-200 && std::isfinite(length)
+                                                    ? Eigen::RowVector3d(sum / length)
+                                                    : Eigen::RowVector3d(0, 1, 0);
   });
 }
 
-void NormalMatrix::add_triangle(std::size_t t, const Positions& x) {
-  const model::StretchConstraint& c = model_.stretch[t];
-  double* const pairs = pair_value_.data() + pair_begin_[t];
-  Mat32 edges;
-  edges.col(0) = (x.row(c.vertices[1]) - x.row(c.vertices[0])).transpose();
-  edges.col(1) = (x.row(c.vertices[2]) - x.row(c.vertices[0])).transpose();
+void NormalMatrix::Impl::fill_sewn(const SewnTriangle& s, const Positions& x) {
+  const model::StretchConstraint& c = model.stretch[at(s.triangle)];
+  double* pair = pair_value.data() + s.first_pair;
   Softening soft;
-  if (!softening(edges * c.rest_inverse, soft)) {
-    std::fill(pairs, pair_value_.data() + pair_begin_[t + 1], 0.0);
+  if (!softening(model::deformation_gradient(c, x), soft)) {
+    std::fill_n(pair, s.num_uses * (s.num_uses + 1) / 2, 0.0);
     return;
   }
+  const auto normal = [&](const Use& use) { return normals.row(use.unknown); };
   const auto rotation = [&](const Use& use) {  // t_a . n_a
-    const auto n = normals_.row(use.unknown);
-    return kInverseSqrt2 * (use.G[1] * n.dot(soft.R1) - use.G[0] * n.dot(soft.R2));
+    return kInverseSqrt2 *
+           (use.G[1] * normal(use).dot(soft.R1) - use.G[0] * normal(use).dot(soft.R2));
   };
-  int pair = 0;
-  for (int i = use_begin_[t]; i < use_begin_[t + 1]; ++i) {
-    const Use& a = uses_[at(i)];
+  for (int i = 0; i < s.num_uses; ++i) {
+    const Use& a = uses[at(s.first_use + i)];
     const double turn_a = soft.c_T * rotation(a);
-    const Vec2 out_a = soft.B * a.G * normals_.row(a.unknown).dot(soft.normal);
-    for (int j = use_begin_[t]; j <= i; ++j) {
-      const Use& b = uses_[at(j)];
-      pairs[pair++] = c.weight * (turn_a * rotation(b) +
-                                  out_a.dot(b.G) * normals_.row(b.unknown).dot(soft.normal));
+    const Vec2 out_a = soft.B * a.G * normal(a).dot(soft.normal);
+    for (int j = 0; j <= i; ++j) {
+      const Use& b = uses[at(s.first_use + j)];
+      *pair++ = c.weight * (turn_a * rotation(b) + out_a.dot(b.G) * normal(b).dot(soft.normal));
     }
+  }
+}
+
+void NormalMatrix::Impl::gather_column(std::size_t column) {
+  const auto c = static_cast<Eigen::Index>(column);
+  const Eigen::RowVector3d n = normals.row(c);
+  for (int e = K.outerIndexPtr()[column]; e < K.outerIndexPtr()[column + 1]; ++e) {
+    const int row = K.innerIndexPtr()[e];
+    if (row < c) continue;
+    double value = K.valuePtr()[e];
+    if (row != c) value *= normals.row(row).dot(n);
+    for (int k = entry_pairs.begin[at(e)]; k < entry_pairs.begin[at(e) + 1]; ++k)
+      value -= pair_value[at(entry_pairs.item[at(k)])];
+    values[at(e)] = value;
   }
 }
 
 std::span<const double> NormalMatrix::assemble(const Positions& x) {
-  find_normals(x);
-  parallel_for(model_.stretch.size(), [&](std::size_t t) { add_triangle(t, x); });
-  parallel_for(static_cast<std::size_t>(reduction_.count()), [&](std::size_t i) {
-    const auto column = static_cast<Eigen::Index>(i);
-    for (int e = K_.outerIndexPtr()[i]; e < K_.outerIndexPtr()[i + 1]; ++e) {
-      const int row = K_.innerIndexPtr()[e];
-      if (row < column) continue;
-      double value = K_.valuePtr()[e];
-      if (row != column) value *= normals_.row(row).dot(normals_.row(column));
-      for (int k = entry_pairs_.begin[at(e)]; k < entry_pairs_.begin[at(e) + 1]; ++k)
-        value -= pair_value_[at(entry_pairs_.item[at(k)])];
-      values_[at(e)] = value;
-    }
-  });
-  return values_;
+  Impl& a = *impl_;
+  a.find_normals(x);
+  constexpr std::size_t kBatches = 32;  // per task
+  parallel_for((a.batches.size() + kBatches - 1) / kBatches,
+               [&](std::size_t block) {
+                 const std::size_t first = block * kBatches;
+                 const auto count = std::min(kBatches, a.batches.size() - first);
+                 a.kernels.normal_pairs(a.batches.data() + first, static_cast<int>(count), x.data(),
+                                        a.normals.data(),
+                                        a.pair_value.data() + first * kPairs * kLanes);
+               },
+               1);
+  parallel_for(a.sewn.size(), [&](std::size_t s) { a.fill_sewn(a.sewn[s], x); });
+  parallel_for(static_cast<std::size_t>(a.reduction.count()),
+               [&](std::size_t column) { a.gather_column(column); });
+  return a.values;
 }
 
 }  // namespace piecework::pd

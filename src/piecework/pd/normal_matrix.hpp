@@ -5,11 +5,11 @@
 // it with mass, bending and tension only. This gap, 1e3 to 1e6, is why projective dynamics
 // converges slowly; the metric K^-1 + N Kn^-1 N^T closes it (docs/convergence.md).
 
+#include <memory>
 #include <span>
-#include <vector>
 
+#include <piecework/core/isa.hpp>
 #include <piecework/core/types.hpp>
-#include <piecework/mesh/topology.hpp>
 #include <piecework/model/constraints.hpp>
 #include <piecework/model/reduction.hpp>
 
@@ -25,43 +25,22 @@ namespace piecework::pd {
 /// With seams, G_a sums over what unknown a carries.
 class NormalMatrix {
  public:
-  /// \param model  must outlive this object
+  /// \param model  must outlive this object, as must `reduction`
   /// \param K      K~ = Reduction::system(), compressed, n_f x n_f, N/m; must outlive this object
   NormalMatrix(const model::ClothModel& model, const model::Reduction& reduction,
-               const SparseMatrix& K);
+               const SparseMatrix& K, Isa isa = best_isa());
+  ~NormalMatrix();
 
   /// Kn at x (|V| x 3, m), N/m: one value per entry of K~, those above the diagonal 0. Valid until
   /// the next call. Fixed order of sums: the same bits for every number of threads.
   std::span<const double> assemble(const Positions& x);
 
   /// N of the last assemble(): n_f x 3, unit rows.
-  [[nodiscard]] const Positions& normals() const { return normals_; }
+  [[nodiscard]] Eigen::Map<const Positions> normals() const;
 
  private:
-  /// What an unknown contributes to a triangle's deformation gradient: F += x_u G^T.
-  struct Use {
-    int unknown;
-    Vec2 G;
-  };
-
-  void list_uses(const model::Reduction& reduction);
-  void list_pairs();
-  void find_normals(const Positions& x);
-  void add_triangle(std::size_t t, const Positions& x);
-
-  const model::ClothModel& model_;
-  const model::Reduction& reduction_;
-  const SparseMatrix& K_;
-  std::vector<int> use_begin_;      ///< per triangle: offsets into uses_
-  std::vector<Use> uses_;           ///< ascending unknowns for each triangle
-  std::vector<int> pair_begin_;     ///< per triangle: offsets into pair_value_
-  std::vector<double> pair_value_;  ///< per triangle and pair of its uses i >= j, N/m
-  mesh::Adjacency entry_pairs_;     ///< per entry of K~: which pair_value_ belong to it
-  mesh::Adjacency vertex_triangles_;
-  Positions triangle_normal_;  ///< per triangle, twice its area long, m^2
-  Positions vertex_normal_;    ///< |V| x 3, sums of the above
-  Positions normals_;
-  std::vector<double> values_;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace piecework::pd

@@ -133,6 +133,26 @@ TEST(NormalMatrix, DegenerateClothKeepsStiffnessAndUnitNormals) {
   }
 }
 
+TEST(NormalMatrix, EveryInstructionSetAgrees) {
+  // Stretched, compressed and collapsed triangles side by side, and free lanes in the last batch.
+  const JoltedCloth cloth(testing::grid_mesh(8, 8), testing::cotton(1e-3), 0.05);
+  Positions x = cloth.z;
+  x.row(20) = x.row(21);
+  x.row(40) = 0.5 * (x.row(41) + x.row(42));
+  const model::Reduction reduction(cloth.model, cloth.fixed);
+  const SparseMatrix K = reduction.system(assemble_system(cloth.model, JoltedCloth::kH));
+  const auto assembled = [&](Isa isa) {
+    NormalMatrix normal(cloth.model, reduction, K, isa);
+    const auto values = normal.assemble(x);
+    return Eigen::VectorXd(
+        Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
+  };
+  const Eigen::VectorXd expected = assembled(Isa::Portable);
+  EXPECT_TRUE(expected.allFinite());
+  for (const Isa isa : available_isas())
+    EXPECT_LT((assembled(isa) - expected).norm(), 1e-12 * expected.norm()) << to_string(isa);
+}
+
 TEST(NormalMatrix, SameBitsForEveryThreadCount) {
   const JoltedCloth cloth(testing::grid_mesh(40, 40), testing::cotton(), 0.01);
   const model::Reduction reduction(cloth.model, cloth.fixed);
