@@ -149,6 +149,7 @@ struct Quality {
   int max_iterations = 200;
   int min_iterations = 1;
   std::string precision = "double";  ///< "double" | "single"
+  std::string preset = "default";  ///< which row of quality_presets() the other members start from
 
   bool operator==(const Quality&) const = default;
 };
