@@ -4,11 +4,13 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <span>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <piecework/core/error.hpp>
+#include <piecework/core/hash.hpp>
 #include <piecework/scene/scene_io.hpp>
 
 namespace piecework::runner {
@@ -98,6 +100,7 @@ Json scene_json(const RunRecord& record, const World& world) {
                {"vertices", world.model.num_vertices()},
                {"dof", 3 * world.model.num_vertices()},
                {"triangles", world.model.triangles.size()},
+               {"triangles_hash", Hash().add(std::span(world.model.triangles)).hex()},
                {"bending_hinges", world.model.bend.size()},
                {"h_s", world.scene.step.h},
                {"mean_edge_m", world.model.mean_edge},
