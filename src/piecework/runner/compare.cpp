@@ -109,10 +109,10 @@ nlohmann::ordered_json median_json(const MedianInterval& m) {
   return {{"median", m.median}, {"low", m.low}, {"high", m.high}, {"n", m.count}};
 }
 
-/// Which rows of a long table are shown: at most ten, evenly, the last one among them.
+/// Which rows of a long table are shown: ten, evenly, the last one among them.
 bool is_shown(std::size_t row, std::size_t rows) {
   constexpr std::size_t kShown = 10;
-  if (rows <= kShown) return true;
+  if (rows <= 2 * kShown) return true;
   return (row + 1) * kShown / rows != row * kShown / rows;
 }
 
@@ -130,8 +130,7 @@ Comparison compare_runs(const fs::path& path_a, const fs::path& path_b) {
   refuse_other_start(a, b, start);
   const std::vector<CommonTime> common = common_times(a, b);
   if (common.empty())
-    refuse(a, b,
-           fmt::format("have no time after 0 in common ({}, {})", times_of(a), times_of(b)),
+    refuse(a, b, fmt::format("have no time after 0 in common ({}, {})", times_of(a), times_of(b)),
            "choose step.h and step.output_every so that frames meet");
   Comparison result;
   result.a = path_a, result.b = path_b;

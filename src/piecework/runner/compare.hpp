@@ -33,10 +33,10 @@ struct Comparison {
   int vertices = 0;
   std::vector<FrameError> frames;  ///< common times, in order; at least one
   double max = 0, rms = 0, motion = 0;
-  double relative = 0;             ///< infinite if B does not move and A differs
-  std::optional<double> energy;    ///< the difference largest in size, J
-  MedianInterval ms_a, ms_b;       ///< ms per step, frames up to the last common time
-  double time_ratio = 0;           ///< medians, A / B; not interleaved. NaN if B has no times
+  double relative = 0;           ///< infinite if B does not move and A differs
+  std::optional<double> energy;  ///< the difference largest in size, J
+  MedianInterval ms_a, ms_b;     ///< ms per step, frames up to the last common time
+  double time_ratio = 0;         ///< medians, A / B; not interleaved. NaN if B has no times
 };
 
 /// Compares two run directories. Times match within 1e-6 of the smaller h.
@@ -47,7 +47,7 @@ Comparison compare_runs(const std::filesystem::path& a, const std::filesystem::p
 /// {"max", "rms", "relative", "time_ratio", ..., "frames": [...]}, schema "piecework.compare/1".
 std::string to_json(const Comparison& comparison);
 
-/// A Markdown table of at most ten common times, and the sums.
+/// A Markdown table of the common times (of more than twenty: ten, evenly), and of all together.
 std::string to_markdown(const Comparison& comparison);
 
 }  // namespace piecework::runner

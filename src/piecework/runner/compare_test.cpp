@@ -57,8 +57,8 @@ TEST_F(Compare, MaximaAndMeansAreOverTimesToo) {
 
 TEST_F(Compare, FramesMeetByTimeNotByNumber) {
   // A: h = 0.1, frames at 0.1 ... 0.6; B: h = 0.05, frames every 0.15 s up to 0.45 s.
-  const Comparison c = compare({.h = 0.1, .frames = 6, .offset = 0.3},
-                               {.h = 0.05, .output_every = 3, .frames = 3});
+  const Comparison c =
+      compare({.h = 0.1, .frames = 6, .offset = 0.3}, {.h = 0.05, .output_every = 3, .frames = 3});
   ASSERT_EQ(c.frames.size(), 1U);
   EXPECT_NEAR(c.frames[0].time, 0.3, 1e-15);
   EXPECT_EQ(c.frames[0].frame_a, 3);
@@ -111,7 +111,8 @@ TEST_F(Compare, RefusesWhatIsNotThere) {
   ensure_directory(folder_.path() / "empty");
   EXPECT_NE(message("empty").find("has no run.json"), std::string::npos);
   ensure_directory(folder_.path() / "damaged");
-  write_file_atomically(folder_.path() / "damaged/run.json", R"({"frames": [], "expectations": []})");
+  write_file_atomically(folder_.path() / "damaged/run.json",
+                        R"({"frames": [], "expectations": []})");
   EXPECT_NE(message("damaged").find("not a run record"), std::string::npos);
   std::filesystem::remove_all(folder_.path() / "b");
   make_run(folder_.path() / "b", {.states = false});
@@ -130,13 +131,15 @@ TEST_F(Compare, RunsOfOurOwnCompare) {
   };
   const auto base = simulate("base", {});
   EXPECT_EQ(compare_runs(simulate("same", {{"solver.domains", "4"}}), base).max, 0);
-  const Comparison rougher = compare_runs(simulate("less", {{"quality.max_iterations", "2"}}), base);
+  const Comparison rougher =
+      compare_runs(simulate("less", {{"quality.max_iterations", "2"}}), base);
   EXPECT_EQ(rougher.frames.size(), 8U);
   EXPECT_GT(rougher.max, 0);
   EXPECT_GE(rougher.max, rougher.rms);
   EXPECT_GT(rougher.time_ratio, 0);
-  EXPECT_THROW((void)compare_runs(simulate("mesh", {{"cloths.0.mesh.pattern", "one_diagonal"}}), base),
-               InputError)
+  EXPECT_THROW(
+      (void)compare_runs(simulate("mesh", {{"cloths.0.mesh.pattern", "one_diagonal"}}), base),
+      InputError)
       << "the same vertices, other triangles";
 }
 

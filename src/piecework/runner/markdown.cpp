@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <piecework/core/parallel.hpp>
 #include <piecework/core/statistics.hpp>
 #include <piecework/runner/cells.hpp>
+#include <piecework/runner/disturbance.hpp>
 #include <piecework/runner/record.hpp>
 
 namespace piecework::runner {
@@ -73,13 +73,6 @@ std::string table_one(const RunRecord& record, const World& world) {
       three_digits(fastest(record)), three_digits(slowest(record)), three_digits(median.median),
       three_digits(mean(steps)));
   return text;
-}
-
-/// Other work took processors that this run wanted.
-bool is_disturbed(const RunRecord& record) {
-  constexpr double kNoticeable = 0.1;  // processors
-  const double spare = std::max(0, available_threads() - record.threads);
-  return record.other_processors > spare + kNoticeable;
 }
 
 /// Phases may leave 5 % of the run unexplained, and may not exceed it.

@@ -11,6 +11,8 @@
 
 #include <piecework/core/error.hpp>
 #include <piecework/core/hash.hpp>
+#include <piecework/core/parallel.hpp>
+#include <piecework/runner/disturbance.hpp>
 #include <piecework/scene/scene_io.hpp>
 
 namespace piecework::runner {
@@ -156,6 +158,12 @@ Totals totals(const std::vector<FrameRecord>& frames) {
   return sum;
 }
 
+bool is_disturbed(const RunRecord& record) {
+  constexpr double kNoticeable = 0.1;  // processors
+  const double spare = std::max(0, available_threads() - record.threads);
+  return record.other_processors > spare + kNoticeable;
+}
+
 std::string to_json(const RunRecord& record, const World& world) {
   Json json;
   json["schema"] = "piecework.run/1";
@@ -163,6 +171,7 @@ std::string to_json(const RunRecord& record, const World& world) {
   json["environment"]["load_before"] = record.load_before;
   json["environment"]["load_after"] = record.load_after;
   json["environment"]["other_processors"] = record.other_processors;
+  json["environment"]["disturbed"] = is_disturbed(record);
   json["environment"]["threads"] = record.threads;
   json["scene"] = scene_json(record, world);
   json["method"] = record.method;

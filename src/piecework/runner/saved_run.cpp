@@ -18,8 +18,8 @@ namespace fs = std::filesystem;
 std::string read_record(const fs::path& directory) {
   std::error_code ignored;
   if (!fs::is_directory(directory, ignored))
-    throw InputError(fmt::format("{}: no such folder; name one that `piecework run` wrote",
-                                 directory.string()));
+    throw InputError(
+        fmt::format("{}: no such folder; name one that `piecework run` wrote", directory.string()));
   if (!fs::exists(directory / "run.json", ignored))
     throw InputError(fmt::format(
         "{}: has no run.json, so no run has finished or stopped here; name a folder that "
@@ -46,6 +46,7 @@ SavedRun read_saved_run(const fs::path& directory) {
     run.triangles = scene.at("triangles");
     run.h = scene.at("h_s");
     run.mean_edge = scene.at("mean_edge_m");
+    run.disturbed = json.at("environment").value("disturbed", false);
     run.environment_json = json.at("environment").dump();
   } catch (const nlohmann::json::exception& error) {
     throw InputError(fmt::format("{}: not a run record of this version ({}); run the scene again",

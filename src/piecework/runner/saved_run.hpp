@@ -18,8 +18,9 @@ struct SavedRun {
   std::string triangles_hash;  ///< empty: written by a version that did not record it
   int vertices = 0;
   int triangles = 0;
-  double h = 0;          ///< s
-  double mean_edge = 0;  ///< m
+  double h = 0;            ///< s
+  double mean_edge = 0;    ///< m
+  bool disturbed = false;  ///< other work took processors from it
   std::string environment_json;
   std::vector<FrameRecord> frames;  ///< without frame 0
 };

@@ -25,7 +25,7 @@ struct MadeRun {
   double offset = 0;
   double step_ms = 2;
   double energy = 10;
-  int iterations = 5;  ///< per step
+  int iterations = 5;                    ///< per step
   double gradient = 1e-3, error = 1e-2;  ///< of the last frame; half of it in those before
   std::string triangles_hash = "t";
   int vertices = 4, triangles = 2;
@@ -71,18 +71,19 @@ inline void make_run(const std::filesystem::path& directory, const MadeRun& made
                       {"energy_j", made.energy},
                       {"dx_unit_box", {{"norm_2", 0}, {"rms", 0}, {"inf", 0}}}});
   }
-  const nlohmann::ordered_json record = {{"schema", "piecework.run/1"},
-                                         {"environment", {{"cpu", "hand-made"}, {"load_before", 1}}},
-                                         {"scene",
-                                          {{"name", "made"},
-                                           {"motion_hash", hash},
-                                           {"vertices", made.vertices},
-                                           {"triangles", made.triangles},
-                                           {"triangles_hash", made.triangles_hash},
-                                           {"h_s", made.h},
-                                           {"mean_edge_m", 1}}},
-                                         {"frames", frames},
-                                         {"expectations", nlohmann::ordered_json::array()}};
+  const nlohmann::ordered_json record = {
+      {"schema", "piecework.run/1"},
+      {"environment", {{"cpu", "hand-made"}, {"load_before", 1}}},
+      {"scene",
+       {{"name", "made"},
+        {"motion_hash", hash},
+        {"vertices", made.vertices},
+        {"triangles", made.triangles},
+        {"triangles_hash", made.triangles_hash},
+        {"h_s", made.h},
+        {"mean_edge_m", 1}}},
+      {"frames", frames},
+      {"expectations", nlohmann::ordered_json::array()}};
   write_file_atomically(directory / "run.json", record.dump());
 }
 

@@ -376,6 +376,11 @@ Scene parse_scene(std::string_view text, const std::string& source,
                   const std::vector<Override>& overrides) {
   Document document = parse_document(text, source);
   for (const auto& [path, value] : overrides) apply_override(document, path, value);
+  return read_scene(document);
+}
+
+Scene read_scene(const Document& document) {
+  const std::string& source = document.sources.front();
   Scene scene;
   const Trail top;
   Reader(document, document.root, top).read_struct(scene);
