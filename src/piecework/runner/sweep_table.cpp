@@ -113,6 +113,12 @@ std::string notes(const SweepTable& table) {
   if (!table.keys.empty()) text += "`-` under a key: as the scene says.\n";
   if (table.has_reference) text += "Errors are those of `piecework compare CASE REFERENCE`.\n";
   for (const SweepRow& row : table.rows) {
+    if (row.job.reference && row.converged_steps < row.steps)
+      text += fmt::format(
+          "**{} of {} steps of the reference did not reach its stop rule: errors below its own "
+          "mean "
+          "little.**\n",
+          row.steps - row.converged_steps, row.steps);
     if (!ok(row)) text += fmt::format("\n{}: {}\n", row.job.name, row.record.message);
     if (!row.note.empty()) text += fmt::format("\n{}: no error: {}\n", row.job.name, row.note);
   }
