@@ -28,6 +28,8 @@ constexpr const char* kExamples =
     "  piecework partition garment.obj -k 32 -o domains.png  cut a mesh into domains\n"
     "  piecework check scene.json                            what is on, and whether it is sound\n"
     "  piecework tune scene.json -o tuned.json               domains for this processor\n"
+    "  piecework compare out/a out/reference                 position error and time ratio\n"
+    "  piecework sweep plan.json -o out/sweep                many settings, one table\n"
     "  piecework scenes                                      scenes that come along\n";
 
 /// Help that starts with examples.
@@ -60,6 +62,8 @@ int run_program(int argc, char** argv) {
   add_render(program, action, verbosity);
   add_partition(program, action, verbosity);
   add_tune(program, action, verbosity);
+  add_compare(program, action);
+  add_sweep(program, action, verbosity);
   add_check(program, action);
   add_env(program, action);
   add_schema(program, action);

@@ -1,7 +1,5 @@
 // piecework run: simulate a scene, draw its frames, write its tables.
 
-#include <atomic>
-#include <csignal>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -15,6 +13,7 @@
 #include "console.hpp"
 #include "pictures.hpp"
 #include "progress.hpp"
+#include "signals.hpp"
 
 namespace piecework::cli {
 namespace {
@@ -27,39 +26,6 @@ constexpr const char* kExamples =
     "  piecework run scene.json -o out/b --no-images --export ply --export obj\n"
     "  piecework run scene.json -o out/c --checkpoint-every 10     # kill it at any time, then:\n"
     "  piecework run scene.json -o out/c --resume                  # same bits as unbroken";
-
-std::atomic<int> stop_signal{0};
-static_assert(std::atomic<int>::is_always_lock_free);
-
-void on_signal(int signal) { stop_signal = signal; }
-
-/// The first Ctrl-C stops after the frame in progress, with a checkpoint; a second one kills.
-class SignalGuard {
- public:
-  SignalGuard() {
-    struct sigaction action {};
-    action.sa_handler = on_signal;
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigaction(SIGINT, &action, &old_int_);
-    sigaction(SIGTERM, &action, &old_term_);
-    // A reader of our messages that goes away (`| head`) must not end a simulation.
-    action.sa_handler = SIG_IGN;
-    action.sa_flags = 0;
-    sigaction(SIGPIPE, &action, &old_pipe_);
-  }
-  ~SignalGuard() {
-    sigaction(SIGINT, &old_int_, nullptr);
-    sigaction(SIGTERM, &old_term_, nullptr);
-    sigaction(SIGPIPE, &old_pipe_, nullptr);
-  }
-  SignalGuard(const SignalGuard&) = delete;
-  SignalGuard& operator=(const SignalGuard&) = delete;
-
- private:
-  struct sigaction old_int_ {};
-  struct sigaction old_term_ {};
-  struct sigaction old_pipe_ {};
-};
 
 struct RunArguments {
   std::string scene;
@@ -120,7 +86,7 @@ class ConsoleObserver : public runner::RunObserver {
                                  double(record->iterations) / record->steps, record->gradient));
   }
 
-  bool should_stop() override { return stop_signal != 0; }
+  bool should_stop() override { return stop_signal() != 0; }
 
   void finish() { progress_.finish(); }
 
@@ -183,7 +149,7 @@ int report(const runner::RunOutcome& outcome, const RunArguments& arguments) {
       say("expectation not reached: {}; simulate more frames\n", e.text);
   if (outcome.stopped) {
     say("stopped after frame {}; continue with --resume\n", outcome.frames_done);
-    return 128 + stop_signal;
+    return 128 + stop_signal();
   }
   fmt::print("{}\n", (std::filesystem::path(arguments.directory) / "summary.md").string());
   return static_cast<int>(arguments.expect && !outcome.expectations_hold() ? ExitCode::CheckFailed
@@ -206,7 +172,8 @@ int run(const RunArguments& arguments, const Verbosity& verbosity) {
   if (!arguments.no_images) check_pictures(pictures_for(scene, arguments));
 
   const runner::RunOutcome outcome = [&] {
-    // Only while it simulates: a signal while it draws ends the program; the checkpoint is there.
+    // Stops after the frame in progress, with a checkpoint. Only while it simulates: a signal while
+    // it draws ends the program; the checkpoint is there.
     const SignalGuard guard;
     ConsoleObserver observer(verbosity, arguments.no_images ? "" : options.directory);
     runner::RunOutcome result = runner::run(scene, options, observer);

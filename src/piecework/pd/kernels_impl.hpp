@@ -42,9 +42,7 @@ V root(V v) {
 
 V smaller(V a, V b) { return a < b ? a : b; }
 
-double total(V v) {
-  return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7]));
-}
+double total(V v) { return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7])); }
 
 struct V3 {
   V x, y, z;
@@ -92,8 +90,7 @@ Sym2 clamped(const Sym2& B) {
           all ? one : B.c - scale * (B.c - low)};
 }
 
-void normal_batch(const NormalBatch& batch, const double* x, const double* normals,
-                  double* pairs) {
+void normal_batch(const NormalBatch& batch, const double* x, const double* normals, double* pairs) {
   const V m00 = load(batch.inverse[0]);
   const V m01 = load(batch.inverse[1]);
   const V m10 = load(batch.inverse[2]);

@@ -59,6 +59,7 @@ std::string scene_hash(const scene::Scene& scene) {
   motion.description.clear();
   motion.source.clear();
   motion.solver.threads = 0;
+  motion.quality.preset.clear();  // its numbers are there
   motion.step.steps = motion.step.output_every;
   motion.camera = {};
   motion.render = {};

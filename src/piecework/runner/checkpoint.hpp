@@ -12,8 +12,8 @@
 namespace piecework::runner {
 
 /// Hash of what the scene's text says about the motion: the resolved scene without threads, length,
-/// pictures, expectations and the places of its mesh files. A run may be continued under another
-/// number of threads or steps.
+/// pictures, expectations, the name of the quality preset (its numbers count) and the places of its
+/// mesh files. A run may be continued under another number of threads or steps.
 std::string scene_hash(const scene::Scene& scene);
 
 /// Hash of what determines the motion: scene_hash() and the meshes themselves (start and rest

@@ -92,6 +92,9 @@ TEST(MotionHash, SeesPhysicsAndOnlyPhysics) {
   for (const char* key : {"solver.threads", "step.steps"})
     EXPECT_EQ(hash_with({{key, "2"}}), base) << key;
   EXPECT_EQ(hash_with({{"render.color", "strain"}, {"camera.fov", "50"}, {"name", "other"}}), base);
+  EXPECT_EQ(hash_with({{"quality.preset", "reference"}, {"quality.tolerance", "0.01"}}), base)
+      << "the same numbers under another name";
+  EXPECT_NE(hash_with({{"quality.preset", "reference"}}), base);
   EXPECT_NE(hash_with({{"step.h", "0.02"}}), base);
   EXPECT_NE(hash_with({{"step.output_every", "2"}}), base) << "frames are counted by it";
   EXPECT_NE(hash_with({{"materials.cotton.density", "0.6"}}), base);

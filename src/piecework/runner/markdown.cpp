@@ -8,33 +8,15 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <piecework/core/parallel.hpp>
 #include <piecework/core/statistics.hpp>
+#include <piecework/runner/cells.hpp>
+#include <piecework/runner/disturbance.hpp>
 #include <piecework/runner/record.hpp>
 
 namespace piecework::runner {
 namespace {
 
-constexpr const char* kOff = "-";
-
-/// Three significant digits, without exponent where a person would not write one.
-std::string three_digits(double value) {
-  if (value == 0) return "0";
-  if (!std::isfinite(value)) return kOff;
-  const double size = std::abs(value);
-  if (size < 1e-3 || size >= 1e6) return fmt::format("{:.2e}", value);
-  const int decimals = std::max(0, 2 - static_cast<int>(std::floor(std::log10(size))));
-  return fmt::format("{:.{}f}", value, decimals);
-}
-
 std::string milliseconds(double value) { return value < 0 ? kOff : three_digits(value); }
-
-/// A name that cannot break a table.
-std::string plain_cell(const std::string& name) {
-  std::string text;
-  for (const char c : name) text += c == '|' ? std::string("\\|") : std::string(1, c);
-  return text;
-}
 
 using Column = std::function<double(const FrameRecord&)>;
 
@@ -49,15 +31,6 @@ std::vector<double> values(const RunRecord& record, const Column& column) {
 
 double mean(const std::vector<double>& v) {
   return v.empty() ? -1 : std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
-}
-
-/// "12.3 [11.9-12.8]": median and its 95 % interval.
-std::string median_cell(const std::vector<double>& v) {
-  if (v.empty()) return kOff;
-  const MedianInterval m = median_interval(v);
-  if (m.count < kMinSamplesForInterval) return three_digits(m.median);
-  return fmt::format("{} [{}-{}]", three_digits(m.median), three_digits(m.low),
-                     three_digits(m.high));
 }
 
 double fastest(const RunRecord& record) {
@@ -102,13 +75,6 @@ std::string table_one(const RunRecord& record, const World& world) {
   return text;
 }
 
-/// Other work took processors that this run wanted.
-bool is_disturbed(const RunRecord& record) {
-  constexpr double kNoticeable = 0.1;  // processors
-  const double spare = std::max(0, available_threads() - record.threads);
-  return record.other_processors > spare + kNoticeable;
-}
-
 /// Phases may leave 5 % of the run unexplained, and may not exceed it.
 bool phases_explain(const RunRecord& record) {
   double other = 0;
@@ -130,8 +96,8 @@ std::string phase_table(const RunRecord& record) {
     const std::vector<double> v = values(record, column);
     const double sum = std::accumulate(v.begin(), v.end(), 0.0);
     const std::string share = v.empty() ? kOff : fmt::format("{:.1f} %", 100 * sum / total);
-    text += fmt::format("| {} | {} | {} | {} | {} |\n", name, median_cell(v), milliseconds(mean(v)),
-                        share, v.size());
+    text += fmt::format("| {} | {} | {} | {} | {} |\n", name, median_cell(median_interval(v)),
+                        milliseconds(mean(v)), share, v.size());
   };
   row("Local step (L)", [](const FrameRecord& f) { return f.phases.local; });
   row("Global step (G)", [](const FrameRecord& f) { return f.phases.global; });

@@ -4,11 +4,15 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <span>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <piecework/core/error.hpp>
+#include <piecework/core/hash.hpp>
+#include <piecework/core/parallel.hpp>
+#include <piecework/runner/disturbance.hpp>
 #include <piecework/scene/scene_io.hpp>
 
 namespace piecework::runner {
@@ -98,6 +102,7 @@ Json scene_json(const RunRecord& record, const World& world) {
                {"vertices", world.model.num_vertices()},
                {"dof", 3 * world.model.num_vertices()},
                {"triangles", world.model.triangles.size()},
+               {"triangles_hash", Hash().add(std::span(world.model.triangles)).hex()},
                {"bending_hinges", world.model.bend.size()},
                {"h_s", world.scene.step.h},
                {"mean_edge_m", world.model.mean_edge},
@@ -153,6 +158,12 @@ Totals totals(const std::vector<FrameRecord>& frames) {
   return sum;
 }
 
+bool is_disturbed(const RunRecord& record) {
+  constexpr double kNoticeable = 0.1;  // processors
+  const double spare = std::max(0, available_threads() - record.threads);
+  return record.other_processors > spare + kNoticeable;
+}
+
 std::string to_json(const RunRecord& record, const World& world) {
   Json json;
   json["schema"] = "piecework.run/1";
@@ -160,6 +171,7 @@ std::string to_json(const RunRecord& record, const World& world) {
   json["environment"]["load_before"] = record.load_before;
   json["environment"]["load_after"] = record.load_after;
   json["environment"]["other_processors"] = record.other_processors;
+  json["environment"]["disturbed"] = is_disturbed(record);
   json["environment"]["threads"] = record.threads;
   json["scene"] = scene_json(record, world);
   json["method"] = record.method;

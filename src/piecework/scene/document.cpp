@@ -104,9 +104,10 @@ Document parse_document(std::string_view text, const std::string& source) {
   return document;
 }
 
-void apply_override(Document& document, const std::string& path, const std::string& value) {
+void apply_override(Document& document, const std::string& path, const std::string& value,
+                    const std::string& source) {
   const Place place{static_cast<std::uint32_t>(document.sources.size()), 0, 0};
-  document.sources.push_back(override_source(path, value));
+  document.sources.push_back(source.empty() ? override_source(path, value) : source);
   const std::vector<std::string> steps = parse_path(path);
   std::string pointer;
   for (const std::string& step : steps) {

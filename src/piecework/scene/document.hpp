@@ -59,7 +59,9 @@ Document parse_document(std::string_view text, const std::string& source);
 /// Sets the value at `path` (dotted or a JSON pointer), making objects on the way where there is
 /// nothing yet. `value` is JSON, or a plain string if it is not.
 /// \throws InputError if the path is malformed, leads through a scalar or past the end of a list.
-void apply_override(Document& document, const std::string& path, const std::string& value);
+/// \param source  how messages about the value begin; empty: "--set path=value".
+void apply_override(Document& document, const std::string& path, const std::string& value,
+                    const std::string& source = "");
 
 /// Throws "<source>:<line>:<column>: <pointer>: <problem>; <remedy>". The root's pointer is printed
 /// as "/".

@@ -151,6 +151,7 @@ struct Quality {
   std::string accelerate = "lbfgs_kn";
   int window = 5;                       ///< remembered iterates
   std::string precision = "automatic";  ///< "automatic" | "double" | "single"
+  std::string preset = "default";  ///< which row of quality_presets() the other members start from
 
   bool operator==(const Quality&) const = default;
 };

@@ -293,6 +293,8 @@ TEST(SceneErrors, ChoicesAndReferences) {
            {with(R"("quality": { "stop": @"never" })"),
             "/quality/stop: unknown value \"never\"; known values: error, gradient, dx_2, dx_rms, "
             "dx_inf, iterations"},
+           {with(R"("quality": { "preset": @"refrence" })"),
+            "/quality/preset: unknown value \"refrence\"; did you mean \"reference\"?"},
            {with(R"("solver": { "global": @"trees" })"),
             "/solver/global: unknown value \"trees\"; did you mean \"tree\"?"},
            {with(R"("solver": { "domains": 3, "domain_weights": @[1, 2] })"),

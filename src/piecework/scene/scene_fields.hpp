@@ -10,6 +10,8 @@
 //   std::array,
 //                                                 std::vector, std::optional of these
 //   choice(const Key&, std::string&, const Choices&)
+//   preset(const Key&, std::string&, T& target, const Presets<T>&)    a choice that sets the
+//                                                 defaults of the keys declared after it
 //   object(const Key&, T&)                        T: a struct, or std::optional of one
 //   list(const Key&, std::vector<T>&)             structs in order
 //   map(const Key&, std::map<std::string, T>&)    structs by name
@@ -19,6 +21,7 @@
 
 #include <initializer_list>
 #include <limits>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -77,10 +80,21 @@ inline constexpr Range kLengths{-1e6, 1e6, false, false};  // m
 inline constexpr Range kTimes{0, 1e9, false, false};       // s
 
 struct Choice {
-  const char* name;
-  const char* doc;
+  std::string name;
+  std::string doc;
 };
 using Choices = std::vector<Choice>;
+
+/// A named set of defaults for one struct; members that a row leaves out keep their own.
+template <class T>
+struct Preset {
+  const char* name;
+  const char* doc;
+  T values;
+};
+template <class T>
+using Presets = std::vector<Preset<T>>;
+
 using Names = std::initializer_list<const char*>;
 
 template <class V>
@@ -372,9 +386,22 @@ void fields(V& v, Solver& s) {
           between(0, 1024));
 }
 
+/// The one table of what the presets mean. The numbers are chosen, not yet measured.
+inline const Presets<Quality>& quality_presets() {
+  static const Presets<Quality> presets = {
+      {"preview", "for a first look", {.stop = "error", .tolerance = 1e-1, .max_iterations = 20}},
+      {"default", "for results", {}},
+      {"reference",
+       "for a run that others are measured against",
+       {.stop = "gradient", .tolerance = 1e-6, .max_iterations = 2000}}};
+  return presets;
+}
+
 template <class V>
 void fields(V& v, Quality& q) {
   v.about("Quality", "How accurately each step is solved.");
+  v.preset({"preset", "defaults of the other keys; a key that is given wins over the preset"},
+           q.preset, q, quality_presets());
   v.choice({"stop", "rule that ends the iterations of a step"}, q.stop,
            {{"error",
              "estimated position error 2 max(1, q / (1 - q)) |dx| <= tolerance * mean edge length; "

@@ -10,6 +10,7 @@
 #include <piecework/scene/document.hpp>
 #include <piecework/scene/nearest.hpp>
 #include <piecework/scene/scene_io.hpp>
+#include <piecework/scene/scene_rules.hpp>
 
 namespace piecework::scene {
 namespace {
@@ -69,11 +70,7 @@ void resolve(std::string& file, const fs::path& folder) {
   if (!file.empty()) file = (folder / file).lexically_normal().string();
 }
 
-}  // namespace
-
-Scene load_scene(const fs::path& path, const std::vector<Override>& overrides) {
-  const fs::path file = find_scene(path);
-  Scene scene = parse_scene(read_file(file, kMaxTextBytes), file.string(), overrides);
+Scene with_resolved_files(Scene scene, const fs::path& file) {
   const fs::path folder = fs::absolute(file).parent_path();
   for (Cloth& cloth : scene.cloths) {
     resolve(cloth.mesh.file, folder);
@@ -81,6 +78,21 @@ Scene load_scene(const fs::path& path, const std::vector<Override>& overrides) {
   }
   for (Seam& seam : scene.seams) resolve(seam.file, folder);
   return scene;
+}
+
+}  // namespace
+
+Scene load_scene(const fs::path& path, const std::vector<Override>& overrides) {
+  const fs::path file = find_scene(path);
+  return with_resolved_files(parse_scene(read_file(file, kMaxTextBytes), file.string(), overrides),
+                             file);
+}
+
+Scene load_scene_with(const fs::path& path, const std::vector<Setting>& settings) {
+  const fs::path file = find_scene(path);
+  Document document = parse_document(read_file(file, kMaxTextBytes), file.string());
+  for (const Setting& s : settings) apply_override(document, s.key, s.value, s.source);
+  return with_resolved_files(read_scene(document), file);
 }
 
 std::vector<BuiltinScene> builtin_scenes() {

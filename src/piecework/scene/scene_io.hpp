@@ -27,6 +27,17 @@ Scene parse_scene(std::string_view text, const std::string& source,
 /// \throws InputError as above; an unknown name is answered with the nearest built-in scenes.
 Scene load_scene(const std::filesystem::path& path, const std::vector<Override>& overrides = {});
 
+/// An override that stands in another file; `source` begins the messages about it:
+/// "plan.json:3:12: /vary/solver.domains/0".
+struct Setting {
+  std::string key;
+  std::string value;
+  std::string source;
+};
+
+/// load_scene() with settings, the later ones over the earlier ones.
+Scene load_scene_with(const std::filesystem::path& path, const std::vector<Setting>& settings);
+
 /// The scene with every default filled in, as JSON that parse_scene() reads back to the same data.
 std::string resolved_json(const Scene& scene);
 

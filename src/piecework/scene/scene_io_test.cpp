@@ -32,7 +32,8 @@ constexpr const char* kEveryKey = R"({
   "solver": { "method": "vanilla_pd", "global": "single", "local": "jacobi", "domains": 5,
               "domain_weights": [1, 1, 1, 0.5, 0.25],
               "threads": 3 },
-  "quality": { "stop": "dx_rms", "tolerance": 1e-3, "max_iterations": 11, "min_iterations": 2 },
+  "quality": { "stop": "dx_rms", "tolerance": 1e-3, "max_iterations": 11, "min_iterations": 2,
+               "accelerate": "anderson", "window": 7, "precision": "single", "preset": "reference" },
   "materials": { "m/1": { "density": 0.1, "stretching": 3e5, "thickness": 1e-3, "bending": 2e-6 },
                  "soft": { "density": 0.2 } },
   "cloths": [
@@ -116,7 +117,7 @@ Scene expected_every_key() {
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;
   scene.solver = {"vanilla_pd", "single", "jacobi", 5, {1, 1, 1, 0.5, 0.25}, 0.5, "recursive", 3};
-  scene.quality = {"dx_rms", 1e-3, 11, 2};
+  scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single", "reference"};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();
   scene.cloths = {expected_first_cloth(), expected_second_cloth()};
@@ -210,6 +211,33 @@ TEST(SceneIo, OverridesReachEveryKindOfKey) {
   EXPECT_EQ(scene.cloths[1].pins.at(0).region.sets, std::vector<std::string>{"border"});
   ASSERT_EQ(scene.expect.size(), 2U);
   EXPECT_EQ(scene.expect[1].max, 3);
+}
+
+TEST(SceneIo, PresetsSetTheDefaultsOfQualityAndGivenKeysWin) {
+  const auto quality = [](const std::vector<Override>& overrides) {
+    return parse_scene(kMinimal, "s", overrides).quality;
+  };
+  const Quality preview{
+      .stop = "error", .tolerance = 0.1, .max_iterations = 20, .preset = "preview"};
+  const Quality reference{
+      .stop = "gradient", .tolerance = 1e-6, .max_iterations = 2000, .preset = "reference"};
+  EXPECT_TRUE(quality({{"quality.preset", "preview"}}) == preview);
+  EXPECT_TRUE(quality({{"quality.preset", "reference"}}) == reference);
+  EXPECT_TRUE(quality({{"quality.preset", "default"}}) == Quality{});
+  Quality finer = reference;
+  finer.tolerance = 1e-9;
+  EXPECT_TRUE(quality({{"quality.preset", "reference"}, {"quality.tolerance", "1e-9"}}) == finer);
+  EXPECT_TRUE(quality({{"quality.tolerance", "1e-9"}, {"quality.preset", "reference"}}) == finer);
+}
+
+TEST(SceneIo, ResolvedScenesShowTheNumbersOfThePreset) {
+  const Scene scene = parse_scene(kMinimal, "s", {{"quality.preset", "preview"}});
+  const std::string resolved = resolved_json(scene);
+  for (const char* line : {"\"preset\": \"preview\"", "\"stop\": \"error\"", "\"tolerance\": 0.1",
+                           "\"max_iterations\": 20"})
+    EXPECT_NE(resolved.find(line), std::string::npos) << line << "\n" << resolved;
+  // The numbers are in the file: another table of presets would not change what it means.
+  EXPECT_EQ(parse_scene(resolved, "s", {{"quality.preset", "reference"}}).quality.tolerance, 0.1);
 }
 
 class SceneFiles : public testing::Test {

@@ -31,6 +31,10 @@ struct KeyNames : IgnoreRules {
   }
   void choice(const Key& key, std::string&, const Choices&) { names.emplace_back(key.name); }
   template <class T>
+  void preset(const Key& key, std::string&, T&, const Presets<T>&) {
+    names.emplace_back(key.name);
+  }
+  template <class T>
   void object(const Key& key, T&) {
     names.emplace_back(key.name);
   }
@@ -63,6 +67,10 @@ struct KeyFinder : IgnoreRules {
     see(key);
   }
   void choice(const Key& key, std::string&, const Choices&) { see(key); }
+  template <class T>
+  void preset(const Key& key, std::string&, T&, const Presets<T>&) {
+    see(key);
+  }
   template <class T>
   void object(const Key& key, T& member) {
     enter(key, member, "");
@@ -145,6 +153,18 @@ class Reader {
     }
     stop(*node, trail, fmt::format("unknown value \"{}\"", printable(member)),
          suggestion(member, names, "values"));
+  }
+
+  /// Keys declared later overwrite what the preset set, in whatever order the text has them.
+  template <class T>
+  void preset(const Key& key, std::string& member, T& target, const Presets<T>& presets) {
+    Choices choices;
+    for (const Preset<T>& preset : presets) choices.push_back({preset.name, preset.doc});
+    choice(key, member, choices);
+    const std::string chosen = member;  // a member of target
+    for (const Preset<T>& preset : presets)
+      if (chosen == preset.name) target = preset.values;
+    member = chosen;
   }
 
   template <class T>
@@ -356,6 +376,11 @@ Scene parse_scene(std::string_view text, const std::string& source,
                   const std::vector<Override>& overrides) {
   Document document = parse_document(text, source);
   for (const auto& [path, value] : overrides) apply_override(document, path, value);
+  return read_scene(document);
+}
+
+Scene read_scene(const Document& document) {
+  const std::string& source = document.sources.front();
   Scene scene;
   const Trail top;
   Reader(document, document.root, top).read_struct(scene);

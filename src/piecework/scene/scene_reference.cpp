@@ -8,6 +8,7 @@
 #include <piecework/scene/scene_fields.hpp>
 #include <piecework/scene/scene_io.hpp>
 #include <piecework/scene/scene_json.hpp>
+#include <piecework/scene/scene_presets.hpp>
 
 namespace piecework::scene {
 namespace {
@@ -111,6 +112,11 @@ class SectionWriter {
     choices_ += fmt::format("\nValues of `{}`:\n\n", key.name);
     for (const Choice& choice : choices)
       choices_ += fmt::format("- `\"{}\"`: {}\n", choice.name, choice.doc);
+  }
+
+  template <class T>
+  void preset(const Key& key, std::string& member, T&, const Presets<T>& presets) {
+    choice(key, member, preset_choices(presets));
   }
 
   template <class T>

@@ -1,11 +1,14 @@
 #pragma once
 
-// Private to the module: what must hold between keys of different places.
+// Private to the module: document -> Scene, and what must hold between keys of different places.
 
 #include <piecework/scene/document.hpp>
 #include <piecework/scene/scene.hpp>
 
 namespace piecework::scene {
+
+/// The scene that a document with its overrides says, checked. \throws InputError.
+Scene read_scene(const Document& document);
 
 /// Checks references by name (materials, cloths) and orders (min <= max, start <= stop) of a scene
 /// that was read from `document`.

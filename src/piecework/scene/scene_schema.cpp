@@ -7,6 +7,7 @@
 #include <piecework/scene/scene_fields.hpp>
 #include <piecework/scene/scene_io.hpp>
 #include <piecework/scene/scene_json.hpp>
+#include <piecework/scene/scene_presets.hpp>
 
 namespace piecework::scene {
 namespace {
@@ -84,6 +85,11 @@ class SchemaWriter {
     }
     schema["description"] = doc;
     if (!member.empty()) schema["default"] = member;
+  }
+
+  template <class T>
+  void preset(const Key& key, std::string& member, T&, const Presets<T>& presets) {
+    choice(key, member, preset_choices(presets));
   }
 
   template <class T>

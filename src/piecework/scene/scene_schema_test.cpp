@@ -226,6 +226,8 @@ TEST(SceneSchema, DefaultsAreThoseOfTheStructs) {
   EXPECT_EQ(default_of("quality.tolerance"), quality.tolerance);
   EXPECT_EQ(default_of("quality.max_iterations"), quality.max_iterations);
   EXPECT_EQ(default_of("quality.min_iterations"), quality.min_iterations);
+  EXPECT_EQ(default_of("quality.precision"), quality.precision);
+  EXPECT_EQ(default_of("quality.preset"), quality.preset);
   const Camera camera;
   EXPECT_EQ(default_of("camera.position"), "none");
   EXPECT_EQ(default_of("camera.target"), "none");

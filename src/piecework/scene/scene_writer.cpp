@@ -23,6 +23,12 @@ class Writer {
 
   void choice(const Key& key, std::string& member, const Choices&) { value(key, member); }
 
+  /// The numbers that follow say all; the name says where they come from.
+  template <class T>
+  void preset(const Key& key, std::string& member, T&, const Presets<T>&) {
+    value(key, member);
+  }
+
   template <class T>
   void object(const Key& key, T& member) {
     json_[key.name] = written(member);
