@@ -4,6 +4,7 @@
 
 #include <piecework/baselines/block_pcg.hpp>
 #include <piecework/baselines/hessian_matrix.hpp>
+#include <piecework/baselines/rounding.hpp>
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/local/jacobi.hpp>
 #include <piecework/model/convergence.hpp>
@@ -29,9 +30,9 @@ struct NewtonOptions {
 };
 
 /// x += t d, H d = -grad E(x), on the unknowns that pins and seams leave (model::Reduction), with t
-/// from a backtracking line search (Armijo). Where H is unprojected and is not positive definite, or d
-/// is no descent or leads nowhere, the projected H takes its place for that iteration. E never rises
-/// by more than its rounding.
+/// from a backtracking line search (Armijo). Where H is unprojected and is not positive definite,
+/// or d is no descent or leads nowhere, the projected H takes its place for that iteration. E never
+/// rises by more than its rounding.
 ///
 /// Phases: local is gradients, energies and the line search; refactor is assembly and factorisation
 /// of H; global is the solves. `global_solves` counts triangular solves, or PCG iterations.
@@ -45,7 +46,8 @@ class Newton final : public model::Minimizer {
 
   void prepare(const std::vector<char>& fixed) override;
   [[nodiscard]] model::SetupReport setup_report() const override;
-  /// \throws SimulationError if the projected H is not positive definite to rounding, or memory ends
+  /// \throws SimulationError if the projected H is not positive definite to rounding, or memory
+  /// ends
   model::StepReport minimize(const model::StepProblem& problem, Positions& x) override;
   [[nodiscard]] std::string description() const override;
 
@@ -60,8 +62,7 @@ class Newton final : public model::Minimizer {
   /// direction_ from H of this form at current_; false if that H will not do.
   bool find_direction(const model::StepProblem& problem, model::HessianForm form,
                       model::StepReport& report);
-  bool solve(const model::StepProblem& problem, model::HessianForm form,
-             model::StepReport& report);
+  bool solve(const model::StepProblem& problem, model::HessianForm form, model::StepReport& report);
   /// Moves current_ along direction_; false if no step was found.
   bool search(const model::StepProblem& problem, model::StepReport& report);
   [[nodiscard]] bool acceptable(double slope, double t) const;
@@ -69,15 +70,12 @@ class Newton final : public model::Minimizer {
   void estimate_error(model::StepReport& report);
   /// grad E . direction on the unknowns, J.
   [[nodiscard]] double slope(const Positions& gradient) const;
-  /// How far E(x) may be off by rounding, J.
-  [[nodiscard]] double energy_rounding(const Point& point) const;
 
   const model::ClothModel& model_;
   NewtonOptions options_;
   model::Convergence convergence_;
   SparseMatrix K_;
-  double total_weight_ = 0;  ///< sum of w over the triangles, J
-  double trace_ = 0;         ///< of K~, N/m
+  EnergyRounding rounding_;
   std::vector<char> fixed_;
   model::Reduction reduction_;
   HessianMatrix hessian_;

@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 
 #include <piecework/baselines/newton.hpp>
+#include <piecework/baselines/pd_jacobi.hpp>
 #include <piecework/baselines/vanilla_pd.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/model/integrator.hpp>
@@ -160,6 +161,13 @@ TEST(SewnCloth, NewtonFindsTheMinimumOfProjectiveDynamics) {
       Newton newton(step.model, kH, 9.81, kTight, {hessian, linear});
       EXPECT_LT((step.end(newton) - expected).cwiseAbs().maxCoeff(), 1e-7);
     }
+}
+
+TEST(SewnCloth, PdJacobiFindsTheMinimumOfProjectiveDynamics) {
+  const SewnStep step;
+  VanillaPd pd(step.model, kH, 9.81, kTight);
+  PdJacobi jacobi(step.model, kH, 9.81, {model::StopRule::Gradient, 1e-9, 200000, 1});
+  EXPECT_LT((step.end(jacobi) - step.end(pd)).cwiseAbs().maxCoeff(), 1e-7);
 }
 
 }  // namespace
