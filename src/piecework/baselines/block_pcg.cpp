@@ -68,8 +68,9 @@ PcgReport BlockPcg::solve(const HessianMatrix& H, const Positions& b, const PcgO
     const double rho_next = dot(residual_, preconditioned_);
     const double beta = rho_next / rho;
     rho = rho_next;
-    each_row(
-        [&](Eigen::Index i) { direction_.row(i) = preconditioned_.row(i) + beta * direction_.row(i); });
+    each_row([&](Eigen::Index i) {
+      direction_.row(i) = preconditioned_.row(i) + beta * direction_.row(i);
+    });
   }
   return report;
 }

@@ -80,8 +80,8 @@ Mat3 HessianMatrix::gathered(std::size_t k) const {
   for (auto u = triangle_uses_.begin[k]; u < triangle_uses_.begin[k + 1]; ++u) {
     const Use& use = triangle_uses_.use[static_cast<std::size_t>(u)];
     const auto pair = static_cast<int>(use.source % 9);
-    block -= use.factor * stretch_[static_cast<std::size_t>(use.source / 9)].block(pair / 3,
-                                                                                 pair % 3);
+    block -=
+        use.factor * stretch_[static_cast<std::size_t>(use.source / 9)].block(pair / 3, pair % 3);
   }
   for (auto u = hinge_uses_.begin[k]; u < hinge_uses_.begin[k + 1]; ++u) {
     const Use& use = hinge_uses_.use[static_cast<std::size_t>(u)];
@@ -143,7 +143,8 @@ const SparseMatrix& HessianMatrix::scalars() {
       double* out = scalars_.valuePtr() + scalars_.outerIndexPtr()[3 * column + j];
       for (int k = begin[column]; k < begin[column + 1]; ++k) {
         if (row[k] < static_cast<int>(column)) continue;
-        for (int i = row[k] == static_cast<int>(column) ? j : 0; i < 3; ++i) *out++ = block(k)(i, j);
+        for (int i = row[k] == static_cast<int>(column) ? j : 0; i < 3; ++i)
+          *out++ = block(k)(i, j);
       }
     }
   });

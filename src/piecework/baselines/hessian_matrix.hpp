@@ -1,7 +1,7 @@
 #pragma once
 
-// The second derivative of the incremental potential on the unknowns, as a block matrix with a fixed
-// pattern.
+// The second derivative of the incremental potential on the unknowns, as a block matrix with a
+// fixed pattern.
 
 #include <cstdint>
 #include <vector>
@@ -13,10 +13,11 @@
 
 namespace piecework::baselines {
 
-/// H = K~ (x) I_3 - T_f^T (softening of triangles and curved hinges) T_f, n_f x n_f blocks of 3 x 3,
-/// N/m. Projected, it lies between M / h^2 and K~ (x) I_3, so it is positive definite.
+/// H = K~ (x) I_3 - T_f^T (softening of triangles and curved hinges) T_f, n_f x n_f blocks of 3 x
+/// 3, N/m. Projected, it lies between M / h^2 and K~ (x) I_3, so it is positive definite.
 ///
-/// Blocks are gathered in parallel, each in a fixed order: the same bits for every number of threads.
+/// Blocks are gathered in parallel, each in a fixed order: the same bits for every number of
+/// threads.
 class HessianMatrix {
  public:
   /// \param model  must outlive this object

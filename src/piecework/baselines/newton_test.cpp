@@ -150,8 +150,7 @@ TEST(Newton, ErrorEstimateIsHonest) {
                       {.density = 0.5, .stretching = 50, .bending = 1e-4}, 0.01);
   for (const NewtonOptions& options : kAll) {
     Positions exact;
-    ASSERT_TRUE(
-        step.solve<Newton>({StopRule::Gradient, 1e-11, 500, 1}, exact, options).converged);
+    ASSERT_TRUE(step.solve<Newton>({StopRule::Gradient, 1e-11, 500, 1}, exact, options).converged);
     for (const double tolerance : {1e-1, 1e-2, 1e-3, 1e-6}) {
       Positions x;
       const auto report = step.solve<Newton>({StopRule::Error, tolerance, 500, 1}, x, options);
@@ -182,8 +181,7 @@ TEST(HessianMatrix, ScalarsAndProductsAreTheBlocks) {
   const model::Reduction reduction(step.model, step.fixed);
   H.set_pattern(reduction, reduction.system(assemble_system(step.model, kTestH)));
   H.assemble(step.z, step.problem(), HessianForm::Unprojected);
-  const Eigen::MatrixXd dense =
-      Eigen::MatrixXd(H.scalars()).selfadjointView<Eigen::Lower>();
+  const Eigen::MatrixXd dense = Eigen::MatrixXd(H.scalars()).selfadjointView<Eigen::Lower>();
   const Positions x = testing::random_positions(H.count(), 1, 3);
   Positions y;
   H.multiply(x, y);

@@ -13,11 +13,11 @@
 
 namespace piecework::baselines {
 
-inline constexpr double kTestH = 1.0 / 120.0;    // s
-inline constexpr double kTestGravity = 9.81;  // m/s^2
+inline constexpr double kTestH = 1.0 / 120.0;  // s
+inline constexpr double kTestGravity = 9.81;   // m/s^2
 
-/// A cloth whose prediction is its rest shape with every vertex off by up to `jolt` m; vertices 0 and
-/// 1 are held.
+/// A cloth whose prediction is its rest shape with every vertex off by up to `jolt` m; vertices 0
+/// and 1 are held.
 struct TestStep {
   mesh::TriangleMesh rest;
   model::Material material;
@@ -58,11 +58,10 @@ struct TestStep {
 
 /// Flat without bending, flat with, curved at rest: membrane of 20 N/m.
 inline TestStep small_step(int kind) {
-  return {kind == 2 ? testing::sphere_mesh(1, 0.3) : testing::grid_mesh(5, 5, 0.3),
-          {.density = 0.5,
-           .stretching = 20,
-           .bending = kind == 0 ? std::nullopt : std::optional(1e-3)},
-          0.01};
+  return {
+      kind == 2 ? testing::sphere_mesh(1, 0.3) : testing::grid_mesh(5, 5, 0.3),
+      {.density = 0.5, .stretching = 20, .bending = kind == 0 ? std::nullopt : std::optional(1e-3)},
+      0.01};
 }
 
 /// Largest distance between two vertices of the same number, m.

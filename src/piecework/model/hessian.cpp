@@ -8,8 +8,8 @@
 namespace piecework::model {
 namespace {
 
-/// S^-1 from F, as accurate as F is: det(F^T F) is never formed. False if F is rank deficient, by the
-/// measure of closest_isometry().
+/// S^-1 from F, as accurate as F is: det(F^T F) is never formed. False if F is rank deficient, by
+/// the measure of closest_isometry().
 bool inverse_stretch(const Mat32& F, Mat2& B) {
   const double aa = F.col(0).squaredNorm();
   const double bb = F.col(1).squaredNorm();

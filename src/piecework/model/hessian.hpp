@@ -2,8 +2,8 @@
 
 // Second derivatives of the constraints' energies, without a singular value decomposition.
 //
-// Projective dynamics' matrix is the second derivative at frozen projections y, an upper bound. What
-// it lacks is that y follows x, and that only ever softens:
+// Projective dynamics' matrix is the second derivative at frozen projections y, an upper bound.
+// What it lacks is that y follows x, and that only ever softens:
 //     triangle   H_ab = w (G_a . G_b) I   - [c_T w t_a t_b^T + w (G_a^T B G_b) n n^T]
 //     hinge      H_ab = w c_a c_b I       - c_a c_b w (L / |v|) (I - v v^T / |v|^2),   v = c^T x
 // with G_a the gradient of corner a's shape function (F = sum_a x_a G_a^T), S = (F^T F)^1/2,
@@ -20,7 +20,8 @@ namespace piecework::model {
 enum class HessianForm {
   Unprojected,  ///< the second derivative; indefinite where cloth is compressed
   /// The nearest positive semidefinite one, per element: c_T <= 1, eigenvalues of B <= 1,
-  /// L / |v| <= 1 [Teran et al. 2005, in closed form]. Equal to the other where that is semidefinite.
+  /// L / |v| <= 1 [Teran et al. 2005, in closed form]. Equal to the other where that is
+  /// semidefinite.
   Projected,
 };
 
@@ -40,7 +41,8 @@ struct StretchSoftening {
 };
 
 /// \param F  deformation_gradient() \param R  its closest isometry, from project_stretch()
-/// A rank-deficient F has no second derivative: it always takes the projected form, which is finite.
+/// A rank-deficient F has no second derivative: it always takes the projected form, which is
+/// finite.
 StretchSoftening stretch_softening(const StretchConstraint& c, const Mat32& F, const Mat32& R,
                                    HessianForm form);
 

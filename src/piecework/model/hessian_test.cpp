@@ -63,8 +63,8 @@ Eigen::MatrixXd bend_hessian(const ClothModel& model, const Positions& x, Hessia
 /// Central differences of the oracle's gradient.
 Eigen::MatrixXd oracle_hessian(const mesh::TriangleMesh& rest, const Material& material,
                                const Positions& x) {
-  const testing::OracleProblem problem{
-      &rest, material, kHeavyStep, x, std::vector<char>(static_cast<std::size_t>(x.rows()), 0)};
+  const testing::OracleProblem problem{&rest, material, kHeavyStep, x,
+                                       std::vector<char>(static_cast<std::size_t>(x.rows()), 0)};
   constexpr double step = 1e-5;
   Eigen::MatrixXd H(x.size(), x.size());
   for (Eigen::Index i = 0; i < x.size(); ++i) {
@@ -180,8 +180,7 @@ TEST(BendHessian, IsTheDerivativeOfTheGradient) {
 TEST(BendHessian, AHingeThatIsMomentarilyFlatIsFinite) {
   const auto model =
       testing::cloth_model(bent_pair(), {.density = 0.5, .stretching = 0, .bending = 0.3});
-  const Eigen::MatrixXd H =
-      bend_hessian(model, Positions::Zero(4, 3), HessianForm::Unprojected);
+  const Eigen::MatrixXd H = bend_hessian(model, Positions::Zero(4, 3), HessianForm::Unprojected);
   EXPECT_TRUE(H.allFinite());
   EXPECT_GT(lowest(H), -1e-12 * H.norm());
 }
