@@ -17,9 +17,10 @@ using model::StepReport;
 namespace {
 
 /// Plain sweeps at the start. [Wang 2015, Alg. 1] has 10; with the test on E below fewer are better
-/// (measured on a hanging sheet of 2.5K vertices: after 200 iterations 1e-11 of E is left, not 4e-11).
+/// (measured on a hanging sheet of 2.5K vertices: after 200 iterations 1e-11 of E is left, not
+/// 4e-11).
 constexpr int kPlainSweeps = 1;
-constexpr int kPowerIterations = 50;    // chosen: within 2 % on cloth
+constexpr int kPowerIterations = 50;  // chosen: within 2 % on cloth
 /// gamma lambda_max; the limit is 2, and the power method is low by 2 %.
 constexpr double kRelaxation = 1.9;
 
@@ -27,7 +28,8 @@ constexpr double kRelaxation = 1.9;
 double largest_jacobi_eigenvalue(const SparseMatrix& K, const Eigen::VectorXd& diagonal) {
   Eigen::VectorXd v(K.rows());
   // The extreme mode alternates from vertex to vertex; any start that is not smooth has some of it.
-  for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = 1.0 + 0.5 * static_cast<double>(i * 7919 % 101);
+  for (Eigen::Index i = 0; i < v.size(); ++i)
+    v[i] = 1.0 + 0.5 * static_cast<double>(i * 7919 % 101);
   for (Eigen::Index i = 1; i < v.size(); i += 2) v[i] = -v[i];
   double eigenvalue = 1;
   Eigen::VectorXd w(K.rows());
@@ -58,8 +60,9 @@ PdJacobi::PdJacobi(const model::ClothModel& model, double h, double gravity,
       local_(model, h) {}
 
 std::string PdJacobi::description() const {
-  return options_.rho ? fmt::format("PD, Jacobi with Chebyshev weights, rho = {:.6g}", *options_.rho)
-                      : std::string("PD, Jacobi with Chebyshev weights, rho from inertia");
+  return options_.rho
+             ? fmt::format("PD, Jacobi with Chebyshev weights, rho = {:.6g}", *options_.rho)
+             : std::string("PD, Jacobi with Chebyshev weights, rho from inertia");
 }
 
 void PdJacobi::prepare(const std::vector<char>& fixed) {

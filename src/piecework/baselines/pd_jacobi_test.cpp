@@ -21,8 +21,8 @@ TEST_P(PdJacobiAgainstOracle, FindsTheMinimumOfProjectiveDynamics) {
   const TestStep step = small_step(GetParam());
   Positions pd;
   ASSERT_TRUE(step.solve<VanillaPd>({StopRule::Gradient, 1e-11, 20000, 1}, pd).converged);
-  for (const PdJacobiOptions& options : {PdJacobiOptions{}, PdJacobiOptions{.rho = 0.0},
-                                         PdJacobiOptions{.rho = 0.9999}}) {
+  for (const PdJacobiOptions& options :
+       {PdJacobiOptions{}, PdJacobiOptions{.rho = 0.0}, PdJacobiOptions{.rho = 0.9999}}) {
     Positions x;
     const auto report = step.solve<PdJacobi>({StopRule::Gradient, 1e-11, 100000, 1}, x, options);
     ASSERT_TRUE(report.converged) << report.gradient;
@@ -32,8 +32,7 @@ TEST_P(PdJacobiAgainstOracle, FindsTheMinimumOfProjectiveDynamics) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(MembraneBendingCurved, PdJacobiAgainstOracle,
-                         ::testing::Values(0, 1, 2));
+INSTANTIATE_TEST_SUITE_P(MembraneBendingCurved, PdJacobiAgainstOracle, ::testing::Values(0, 1, 2));
 
 TEST(PdJacobi, EnergyNeverRises) {
   const TestStep step(testing::grid_mesh(10, 10), testing::cotton(1e-3), 0.05);
@@ -53,8 +52,8 @@ TEST(PdJacobi, EnergyNeverRises) {
 TEST(PdJacobi, DropsIteratesThatWouldRaiseTheEnergy) {
   const TestStep step(testing::grid_mesh(10, 10), testing::cotton(1e-3), 0.05);
   Positions x;
-  const auto report = step.solve<PdJacobi>({StopRule::Iterations, 0, 300, 1}, x,
-                                           PdJacobiOptions{.rho = 0.99999});
+  const auto report =
+      step.solve<PdJacobi>({StopRule::Iterations, 0, 300, 1}, x, PdJacobiOptions{.rho = 0.99999});
   EXPECT_LT(report.global_solves, report.iterations);
   EXPECT_GT(report.global_solves, report.iterations / 2);
 }
@@ -73,8 +72,8 @@ TEST(PdJacobi, KnowsTheLargestEigenvalue) {
   const TestStep step(testing::grid_mesh(8, 8), testing::cotton(1e-3), 0.02);
   PdJacobi method(step.model, kTestH, kTestGravity, {});
   method.prepare(step.fixed);
-  const Eigen::MatrixXd K = model::Reduction(step.model, step.fixed)
-                                .system(assemble_system(step.model, kTestH));
+  const Eigen::MatrixXd K =
+      model::Reduction(step.model, step.fixed).system(assemble_system(step.model, kTestH));
   const Eigen::VectorXd scale = K.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * K * scale.asDiagonal();
   const double exact =
