@@ -8,7 +8,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <piecework/baselines/newton.hpp>
+#include <piecework/baselines/pd_jacobi.hpp>
 #include <piecework/baselines/vanilla_pd.hpp>
+#include <piecework/baselines/xpbd.hpp>
 #include <piecework/core/clock.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/generate.hpp>
@@ -273,20 +276,72 @@ std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
                                                               : global::Precision::Double});
 }
 
-std::unique_ptr<model::Integrator> make_integrator(const World& world) {
-  const scene::Scene& scene = world.scene;
+namespace {
+
+/// What every method is made from.
+struct MethodContext {
+  const World& world;
+  double gravity;  ///< magnitude, m/s^2
+  model::StopOptions stop;
+};
+
+MethodContext method_context(const World& world) {
   constexpr double kStandardGravity = 9.81;  // m/s^2: turns forces into weights where there is none
   const double gravity = world.forces.gravity ? world.forces.gravity->norm() : 0;
-  const model::StopOptions stop{.rule = stop_rule(scene.quality.stop),
-                                .tolerance = scene.quality.tolerance,
-                                .max_iterations = scene.quality.max_iterations,
-                                .min_iterations = scene.quality.min_iterations};
-  auto minimizer = std::make_unique<baselines::VanillaPd>(world.model, scene.step.h,
-                                                          gravity > 0 ? gravity : kStandardGravity,
-                                                          stop, make_exact_solver(world));
+  const scene::Quality& quality = world.scene.quality;
+  return {world,
+          gravity > 0 ? gravity : kStandardGravity,
+          {.rule = stop_rule(quality.stop),
+           .tolerance = quality.tolerance,
+           .max_iterations = quality.max_iterations,
+           .min_iterations = quality.min_iterations}};
+}
+
+std::unique_ptr<model::Minimizer> make_newton(const MethodContext& context) {
+  const scene::Solver& solver = context.world.scene.solver;
+  return std::make_unique<baselines::Newton>(
+      context.world.model, context.world.scene.step.h, context.gravity, context.stop,
+      baselines::NewtonOptions{
+          .hessian = solver.hessian == "unprojected" ? model::HessianForm::Unprojected
+                                                     : model::HessianForm::Projected,
+          .linear = solver.linear == "pcg" ? baselines::NewtonLinear::Pcg
+                                           : baselines::NewtonLinear::Cholmod});
+}
+
+std::unique_ptr<model::Minimizer> make_vanilla_pd(const MethodContext& context) {
+  return std::make_unique<baselines::VanillaPd>(context.world.model, context.world.scene.step.h,
+                                                context.gravity, context.stop,
+                                                make_exact_solver(context.world));
+}
+
+std::unique_ptr<model::Minimizer> make_pd_jacobi(const MethodContext& context) {
+  return std::make_unique<baselines::PdJacobi>(
+      context.world.model, context.world.scene.step.h, context.gravity, context.stop,
+      baselines::PdJacobiOptions{.rho = context.world.scene.solver.chebyshev_rho,
+                                 .gamma = std::nullopt});
+}
+
+std::unique_ptr<model::Minimizer> make_xpbd(const MethodContext& context) {
+  return std::make_unique<baselines::Xpbd>(context.world.model, context.world.scene.step.h,
+                                           context.gravity, context.stop);
+}
+
+std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
+  const MethodContext context = method_context(world);
+  const std::string& method = world.scene.solver.method;
+  if (method == "newton") return make_newton(context);
+  if (method == "pd_jacobi") return make_pd_jacobi(context);
+  if (method == "xpbd") return make_xpbd(context);
+  return make_vanilla_pd(context);
+}
+
+}  // namespace
+
+std::unique_ptr<model::Integrator> make_integrator(const World& world) {
   return std::make_unique<model::Integrator>(
       world.model, world.forces, world.pins,
-      model::IntegratorOptions{.h = scene.step.h, .damping = scene.damping}, std::move(minimizer));
+      model::IntegratorOptions{.h = world.scene.step.h, .damping = world.scene.damping},
+      make_minimizer(world));
 }
 
 }  // namespace piecework::runner
