@@ -13,9 +13,9 @@ Coloring color_greedily(std::span<const int> vertices_begin, std::span<const int
   std::vector<int> near;
   for (std::size_t i = 0; i < count; ++i) {
     near.clear();
-    const auto mine = vertices.subspan(
-        static_cast<std::size_t>(vertices_begin[i]),
-        static_cast<std::size_t>(vertices_begin[i + 1] - vertices_begin[i]));
+    const auto mine =
+        vertices.subspan(static_cast<std::size_t>(vertices_begin[i]),
+                         static_cast<std::size_t>(vertices_begin[i + 1] - vertices_begin[i]));
     for (const int v : mine) {
       const auto& of_vertex = taken[static_cast<std::size_t>(v)];
       near.insert(near.end(), of_vertex.begin(), of_vertex.end());

@@ -26,7 +26,8 @@ void color_by_color(const Coloring& coloring, const Body& body) {
   for (int color = 0; color < coloring.num_colors(); ++color) {
     const auto first = static_cast<std::size_t>(coloring.begin[static_cast<std::size_t>(color)]);
     const auto last = static_cast<std::size_t>(coloring.begin[static_cast<std::size_t>(color) + 1]);
-    parallel_for(last - first, [&](std::size_t i) { body(first + i); }, kGrain);
+    parallel_for(
+        last - first, [&](std::size_t i) { body(first + i); }, kGrain);
   }
 }
 
@@ -34,13 +35,16 @@ void color_by_color(const Coloring& coloring, const Body& body) {
 
 Xpbd::Xpbd(const model::ClothModel& model, double h, double gravity, model::StopOptions stop,
            XpbdOptions options)
-    : model_(model), options_(options), h_sq_(h * h), convergence_(model, gravity, stop), local_(model, h) {}
+    : model_(model),
+      options_(options),
+      h_sq_(h * h),
+      convergence_(model, gravity, stop),
+      local_(model, h) {}
 
 std::string Xpbd::description() const {
   return fmt::format("XPBD, {}, Gauss-Seidel in {} + {} colours",
                      options_.stretch == XpbdStretch::Norm ? "|F - R|" : "F - R",
-                     triangles_.coloring.num_colors(),
-                     hinges_.coloring.num_colors());
+                     triangles_.coloring.num_colors(), hinges_.coloring.num_colors());
 }
 
 template <std::size_t N, class Factor>
@@ -88,14 +92,14 @@ void Xpbd::prepare(const std::vector<char>& fixed) {
   reduction_ = model::Reduction(model_, fixed);
   Eigen::VectorXd mass = model_.mass;
   for (const int slave : model_.sewing.map().slaves)
-    model_.sewing.map().visit_carriers(slave, [&](int carrier, double weight) {
-      mass[carrier] += weight * model_.mass[slave];
-    });
+    model_.sewing.map().visit_carriers(
+        slave, [&](int carrier, double weight) { mass[carrier] += weight * model_.mass[slave]; });
   inverse_mass_.setZero(mass.size());
   for (const int v : reduction_.vertices()) inverse_mass_[v] = 1.0 / mass[v];
   triangles_ = make_kind(model_.stretch.size(), [&](std::size_t t, std::vector<Touch>& touches) {
     const auto G = shape_gradients(model_.stretch[t]);
-    add_touches(model_.stretch[t].vertices, [&](std::size_t a) { return G[a]; }, touches);
+    add_touches(
+        model_.stretch[t].vertices, [&](std::size_t a) { return G[a]; }, touches);
   });
   triangles_.multiplier.setZero(2 * triangles_.multiplier.rows(), 3);
   hinges_ = make_kind(model_.bend.size(), [&](std::size_t i, std::vector<Touch>& touches) {
@@ -212,8 +216,8 @@ Vec3 Xpbd::curvature(std::size_t i) const {
   const auto last = static_cast<std::size_t>(hinges_.begin[i + 1]);
   const int origin = hinges_.touch[first].vertex;
   for (std::size_t k = first + 1; k < last; ++k)
-    v += hinges_.touch[k].factor[0] *
-         (x_.row(hinges_.touch[k].vertex) - x_.row(origin)).transpose();
+    v +=
+        hinges_.touch[k].factor[0] * (x_.row(hinges_.touch[k].vertex) - x_.row(origin)).transpose();
   return v;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// Extended position-based dynamics [Macklin et al. 2016], with our energies as compliant constraints.
+// Extended position-based dynamics [Macklin et al. 2016], with our energies as compliant
+// constraints.
 
 #include <vector>
 
@@ -19,28 +20,28 @@ enum class XpbdStretch {
 };
 
 struct XpbdOptions {
-  /// Frame by default: on a hanging sheet of 2.5K vertices Norm stays 10 % of the step's motion away
-  /// from the minimum, Frame is as near after 200 sweeps and at 1e-3 after 1000. (Before 50 sweeps
-  /// Norm is the nearer one.)
+  /// Frame by default: on a hanging sheet of 2.5K vertices Norm stays 10 % of the step's motion
+  /// away from the minimum, Frame is as near after 200 sweeps and at 1e-3 after 1000. (Before 50
+  /// sweeps Norm is the nearer one.)
   XpbdStretch stretch = XpbdStretch::Frame;
 };
 
 /// From x = z and lambda = 0, constraint after constraint (Gauss-Seidel by colours, in parallel):
-///     dlambda = -(grad C M^-1 grad C^T + a)^-1 (C + a lambda),  a = 1 / (w h^2)  
+///     dlambda = -(grad C M^-1 grad C^T + a)^-1 (C + a lambda),  a = 1 / (w h^2)
 ///     dx = M^-1 grad C^T dlambda
-/// for C of a triangle as XpbdStretch says, C = |c^T x| - L of a hinge that is curved at rest, and the
-/// three coordinates of c^T x of one that is flat: then w |C|^2 / 2 is the energy of
+/// for C of a triangle as XpbdStretch says, C = |c^T x| - L of a hinge that is curved at rest, and
+/// the three coordinates of c^T x of one that is flat: then w |C|^2 / 2 is the energy of
 /// model::ClothModel.
 ///
-/// Its limit: what the constraints have moved x by is never compared with M (x - z) = grad C^T lambda
-/// at the x that was reached (their g = 0 is assumed). Where gradients turn during the
+/// Its limit: what the constraints have moved x by is never compared with M (x - z) = grad C^T
+/// lambda at the x that was reached (their g = 0 is assumed). Where gradients turn during the
 /// iterations, as that of |F - R| does, the end is no minimum of the incremental potential, however
-/// many follow: stop rules on increments are met, the rule `gradient` may never be. Constraints with
-/// constant gradients, Frame and flat hinges, are exact. With seams the mass of a slave is lumped
-/// onto its carriers, which is another approximation.
+/// many follow: stop rules on increments are met, the rule `gradient` may never be. Constraints
+/// with constant gradients, Frame and flat hinges, are exact. With seams the mass of a slave is
+/// lumped onto its carriers, which is another approximation.
 ///
-/// Phases: all is local. The last gradient and energy are measured once, at the end, unless the stop
-/// rule asks for them in each iteration.
+/// Phases: all is local. The last gradient and energy are measured once, at the end, unless the
+/// stop rule asks for them in each iteration.
 class Xpbd final : public model::Minimizer {
  public:
   /// \param model    must outlive this object
