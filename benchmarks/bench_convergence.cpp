@@ -20,6 +20,7 @@
 #include <piecework/core/clock.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/core/statistics.hpp>
+#include <piecework/runner/methods.hpp>
 
 #include "bench.hpp"
 #include "hanging_sheet.hpp"

@@ -13,6 +13,7 @@
 #include <piecework/core/clock.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/mesh/generate.hpp>
+#include <piecework/runner/methods.hpp>
 #include <piecework/runner/world.hpp>
 #include <piecework/testing/small_cloths.hpp>
 

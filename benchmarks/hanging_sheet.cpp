@@ -7,6 +7,7 @@
 
 #include <piecework/baselines/newton.hpp>
 #include <piecework/core/parallel.hpp>
+#include <piecework/runner/methods.hpp>
 
 namespace piecework::bench {
 namespace {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -18,7 +17,6 @@ using model::StepReport;
 
 namespace {
 
-constexpr double kRounding = std::numeric_limits<double>::epsilon();
 constexpr double kArmijo = 1e-4;     // customary [Nocedal and Wright 2006, Sec. 3.1]
 constexpr int kMaxBacktracks = 40;   // chosen: t = 1e-12 at best, below any useful step
 constexpr double kMaxForcing = 0.1;  // chosen, as in most inexact Newton methods
@@ -31,10 +29,9 @@ Newton::Newton(const model::ClothModel& model, double h, double gravity, model::
       options_(options),
       convergence_(model, gravity, stop),
       K_(assemble_system(model, h)),
+      rounding_(model),
       hessian_(model),
-      local_(model, h) {
-  for (const model::StretchConstraint& c : model.stretch) total_weight_ += c.weight;
-}
+      local_(model, h) {}
 
 std::string Newton::description() const {
   const bool direct = options_.linear == NewtonLinear::Cholmod;
@@ -47,7 +44,7 @@ void Newton::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;
   reduction_ = model::Reduction(model_, fixed);
   hessian_.set_pattern(reduction_, reduction_.system(K_));
-  trace_ = hessian_.system().diagonal().sum();
+  rounding_.set_system(hessian_.system());
   rhs_.resize(reduction_.count(), 3);
   if (options_.linear == NewtonLinear::Cholmod &&
       cholmod_.analyze(hessian_.scalars(), 3) != global::SolveStatus::Ok)
@@ -159,18 +156,11 @@ double Newton::slope(const Positions& gradient) const {
   });
 }
 
-double Newton::energy_rounding(const Point& point) const {
-  // Coordinates are off by their own rounding, strains by that of F, and sums by that of E.
-  const double position = kRounding * point.x.cwiseAbs().maxCoeff();
-  const double strain = std::sqrt(2.0 * point.energy * total_weight_);
-  return 8.0 * kRounding * (point.energy + strain) + 3.0 * trace_ * position * position;
-}
-
 bool Newton::acceptable(double slope_at_start, double t) const {
   const double rise = trial_.energy - current_.energy;
   if (rise <= kArmijo * t * slope_at_start) return true;  // false for NaN
   // Near the minimum E has no digits left to compare, but its slope still has.
-  return std::abs(rise) <= energy_rounding(current_) &&
+  return std::abs(rise) <= rounding_.at(current_.energy, current_.x) &&
          std::abs(slope(trial_.gradient)) <= std::abs(slope_at_start);
 }
 

@@ -4,6 +4,7 @@
 
 #include <piecework/baselines/block_pcg.hpp>
 #include <piecework/baselines/hessian_matrix.hpp>
+#include <piecework/baselines/rounding.hpp>
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/local/jacobi.hpp>
 #include <piecework/model/convergence.hpp>
@@ -69,15 +70,12 @@ class Newton final : public model::Minimizer {
   void estimate_error(model::StepReport& report);
   /// grad E . direction on the unknowns, J.
   [[nodiscard]] double slope(const Positions& gradient) const;
-  /// How far E(x) may be off by rounding, J.
-  [[nodiscard]] double energy_rounding(const Point& point) const;
 
   const model::ClothModel& model_;
   NewtonOptions options_;
   model::Convergence convergence_;
   SparseMatrix K_;
-  double total_weight_ = 0;  ///< sum of w over the triangles, J
-  double trace_ = 0;         ///< of K~, N/m
+  EnergyRounding rounding_;
   std::vector<char> fixed_;
   model::Reduction reduction_;
   HessianMatrix hessian_;

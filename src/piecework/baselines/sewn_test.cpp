@@ -1,10 +1,14 @@
 // Sewn cloth in motion: against one sheet without seams, thread by thread, open seams that close.
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
 #include <piecework/baselines/newton.hpp>
+#include <piecework/baselines/pd_jacobi.hpp>
 #include <piecework/baselines/vanilla_pd.hpp>
+#include <piecework/baselines/xpbd.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/model/integrator.hpp>
 #include <piecework/model/measures.hpp>
@@ -160,6 +164,29 @@ TEST(SewnCloth, NewtonFindsTheMinimumOfProjectiveDynamics) {
       Newton newton(step.model, kH, 9.81, kTight, {hessian, linear});
       EXPECT_LT((step.end(newton) - expected).cwiseAbs().maxCoeff(), 1e-7);
     }
+}
+
+TEST(SewnCloth, PdJacobiFindsTheMinimumOfProjectiveDynamics) {
+  const SewnStep step;
+  VanillaPd pd(step.model, kH, 9.81, kTight);
+  PdJacobi jacobi(step.model, kH, 9.81, {model::StopRule::Gradient, 1e-9, 200000, 1});
+  EXPECT_LT((step.end(jacobi) - step.end(pd)).cwiseAbs().maxCoeff(), 1e-7);
+}
+
+TEST(SewnCloth, XpbdKeepsTheSeams) {
+  const auto model = sewn_model({{0, 0, 1, 1, 7, 7}, {1, 0, 2, 1, 7, 10}}, 0.25, {0.2, 0.05, 0});
+  const Eigen::MatrixXd C = testing::constraint_rows(
+      testing::geometric_stitches({{0, 0, 1, 1, 7, 7}, {1, 0, 2, 1, 7, 10}}), model.num_vertices());
+  model::Integrator integrator(
+      model, Motion::forces(std::nullopt), {{.vertices = {0, 42}}}, {.h = kH},
+      std::make_unique<Xpbd>(model, kH, 9.81,
+                             model::StopOptions{model::StopRule::Iterations, 0, 50}));
+  model::State state = integrator.initial_state({});
+  for (int i = 0; i < 40; ++i) (void)integrator.step(state);
+  EXPECT_LT((C * state.x).cwiseAbs().maxCoeff(), 1e-13) << "closed, and every stitch holds";
+  EXPECT_TRUE(state.x.row(0) == model.start.row(0));
+  const auto strain = model::triangle_strain(model, state.x);
+  EXPECT_LT(*std::max_element(strain.begin(), strain.end()), 0.5);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include <piecework/runner/checkpoint.hpp>
 #include <piecework/runner/environment.hpp>
 #include <piecework/runner/expectation.hpp>
+#include <piecework/runner/methods.hpp>
 #include <piecework/scene/scene_io.hpp>
 
 namespace piecework::runner {

@@ -11,6 +11,7 @@
 #include <piecework/local/jacobi.hpp>
 #include <piecework/model/assembly.hpp>
 #include <piecework/model/reduction.hpp>
+#include <piecework/runner/methods.hpp>
 
 namespace piecework::runner {
 namespace {

@@ -8,13 +8,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <piecework/baselines/vanilla_pd.hpp>
 #include <piecework/core/clock.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/generate.hpp>
 #include <piecework/mesh/import.hpp>
-#include <piecework/pd/dd_pd.hpp>
-#include <piecework/pd/primal_dual_step.hpp>
 #include <piecework/runner/sewing.hpp>
 
 namespace piecework::runner {
@@ -167,30 +164,6 @@ model::ClothPart make_part(World& world, const scene::Cloth& cloth, const std::s
   return part;
 }
 
-model::StopRule stop_rule(const std::string& name) {
-  if (name == "gradient") return model::StopRule::Gradient;
-  if (name == "dx_2") return model::StopRule::Dx2;
-  if (name == "dx_rms") return model::StopRule::DxRms;
-  if (name == "dx_inf") return model::StopRule::DxInf;
-  if (name == "iterations") return model::StopRule::Iterations;
-  return model::StopRule::Error;
-}
-
-global::Precision tree_precision(const scene::Scene& scene) {
-  const std::string& asked = scene.quality.precision;
-  const bool single = asked == "single" || (asked == "automatic" && scene.solver.method == "dd_pd");
-  return single ? global::Precision::Single : global::Precision::Double;
-}
-
-pd::AccelerationOptions acceleration(const scene::Quality& quality) {
-  using enum pd::AccelerationKind;
-  pd::AccelerationOptions options{.kind = Lbfgs, .window = quality.window};
-  if (quality.accelerate == "none") options.kind = None;
-  if (quality.accelerate == "chebyshev") options.kind = Chebyshev;
-  if (quality.accelerate == "anderson") options.kind = Anderson;
-  return options;
-}
-
 }  // namespace
 
 decomposition::Elements World::elements() const {
@@ -266,54 +239,6 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
   world->notes.insert(world->notes.end(), world->domains.notes.begin(), world->domains.notes.end());
   world->partition_ms = watch.lap();
   return world;
-}
-
-std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
-  const scene::Solver& solver = world.scene.solver;
-  if (solver.global == "single") return global::make_cholmod_solver();
-  if (solver.global == "primal_dual") {
-    pd::PrimalDualStepOptions options{.corner_fraction = solver.corner_fraction};
-    options.solver.interface = solver.interface == "dense"    ? global::InterfaceKind::Dense
-                               : solver.interface == "sparse" ? global::InterfaceKind::Sparse
-                                                              : global::InterfaceKind::Recursive;
-    return pd::make_primal_dual_solver(world.model, world.domains, world.scene.step.h, options);
-  }
-  global::VertexTree domains;
-  if (world.domains.num_domains > 1) {
-    for (const auto& node : world.domains.nodes) domains.node_parent.push_back(node.parent);
-    domains.vertex_node = world.domains.vertex_node;
-  }
-  return global::make_tree_solver(std::move(domains), {.precision = tree_precision(world.scene)});
-}
-
-std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
-  const scene::Scene& scene = world.scene;
-  constexpr double kStandardGravity = 9.81;  // m/s^2: turns forces into weights where there is none
-  const double magnitude = world.forces.gravity ? world.forces.gravity->norm() : 0;
-  const double gravity = magnitude > 0 ? magnitude : kStandardGravity;
-  const model::StopOptions stop{.rule = stop_rule(scene.quality.stop),
-                                .tolerance = scene.quality.tolerance,
-                                .max_iterations = scene.quality.max_iterations,
-                                .min_iterations = scene.quality.min_iterations};
-  if (scene.solver.method == "vanilla_pd")
-    return std::make_unique<baselines::VanillaPd>(world.model, scene.step.h, gravity, stop,
-                                                  make_exact_solver(world));
-  return std::make_unique<pd::DdPd>(
-      world.model,
-      pd::DdPdOptions{.h = scene.step.h,
-                      .gravity = gravity,
-                      .stop = stop,
-                      .acceleration = acceleration(scene.quality),
-                      .normals = scene.quality.accelerate == "lbfgs_kn" ? pd::NormalPart::Automatic
-                                                                        : pd::NormalPart::Never},
-      make_exact_solver(world));
-}
-
-std::unique_ptr<model::Integrator> make_integrator(const World& world) {
-  const scene::Scene& scene = world.scene;
-  return std::make_unique<model::Integrator>(
-      world.model, world.forces, world.pins,
-      model::IntegratorOptions{.h = scene.step.h, .damping = scene.damping}, make_minimizer(world));
 }
 
 }  // namespace piecework::runner

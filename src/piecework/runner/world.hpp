@@ -8,11 +8,9 @@
 #include <vector>
 
 #include <piecework/decomposition/decomposition.hpp>
-#include <piecework/global/exact_solver.hpp>
 #include <piecework/mesh/triangle_mesh.hpp>
 #include <piecework/model/constraints.hpp>
 #include <piecework/model/forces.hpp>
-#include <piecework/model/integrator.hpp>
 #include <piecework/model/pins.hpp>
 #include <piecework/scene/scene.hpp>
 
@@ -52,14 +50,5 @@ std::unique_ptr<World> build_world(const scene::Scene& scene);
 
 /// The mesh that a scene's `mesh` object describes, in its own coordinates.
 mesh::MeshDocument load_mesh(const scene::Mesh& mesh);
-
-/// The exact global solve that the scene asks for, not yet factored. \pre `world` outlives it.
-std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world);
-
-/// The method that the scene asks for. \pre `world` outlives it.
-std::unique_ptr<model::Minimizer> make_minimizer(const World& world);
-
-/// The integrator that the scene asks for. \pre `world` outlives it.
-std::unique_ptr<model::Integrator> make_integrator(const World& world);
 
 }  // namespace piecework::runner

@@ -137,6 +137,9 @@ struct Solver {
   double corner_fraction = 0.5;
   std::string interface = "recursive";
   int threads = 0;  ///< 0: what the machine allows
+  std::string hessian = "projected";
+  std::string linear = "cholmod";
+  std::optional<double> chebyshev_rho;  ///< absent: from inertia
 
   bool operator==(const Solver&) const = default;
 };

@@ -356,7 +356,28 @@ void fields(V& v, Solver& s) {
         "projective dynamics by domains, with an outer loop that `quality.accelerate` chooses"},
        {"vanilla_pd",
         "projective dynamics: local and global steps in "
-        "turn, not accelerated"}});
+        "turn, not accelerated"},
+       {"newton",
+        "Newton's method with a line search, for comparison: few iterations, each with a matrix "
+        "of three times as many rows; `global`, `local` and domains play no part"},
+       {"pd_jacobi",
+        "projective dynamics with Jacobi sweeps and Chebyshev weights instead of the global "
+        "solve, for comparison: many iterations, nothing is factored"},
+       {"xpbd",
+        "extended position-based dynamics, for comparison: constraint after constraint. It "
+        "approaches the result of the others, but on seams and curved rest shapes only nearly"}});
+  v.choice(
+      {"hessian", "`method: newton`: second derivative of the energy"}, s.hessian,
+      {{"projected", "made positive semidefinite, triangle by triangle"},
+       {"unprojected",
+        "as it is, and projected where that is not positive definite: quadratic convergence"}});
+  v.choice({"linear", "`method: newton`: how the linear system is solved"}, s.linear,
+           {{"cholmod", "sparse Cholesky factor in each iteration, on one thread"},
+            {"pcg", "conjugate gradients with 3 x 3 diagonal blocks, in parallel, inexactly"}});
+  v.value(
+      {"chebyshev_rho",
+       "`method: pd_jacobi`: spectral radius that the weights are made for; absent: from inertia"},
+      s.chebyshev_rho, between(0, 0.999999));
   v.choice({"global", "global solve"}, s.global,
            {{"tree",
              "exact and parallel: nested dissection whose top cuts are the borders of the domains"},

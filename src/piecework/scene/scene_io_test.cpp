@@ -31,7 +31,7 @@ constexpr const char* kEveryKey = R"({
   "damping": 0.125,
   "solver": { "method": "vanilla_pd", "global": "single", "local": "jacobi", "domains": 5,
               "domain_weights": [1, 1, 1, 0.5, 0.25],
-              "threads": 3 },
+              "threads": 3, "hessian": "unprojected", "linear": "pcg", "chebyshev_rho": 0.75 },
   "quality": { "stop": "dx_rms", "tolerance": 1e-3, "max_iterations": 11, "min_iterations": 2,
                "accelerate": "anderson", "window": 7, "precision": "single", "preset": "reference" },
   "materials": { "m/1": { "density": 0.1, "stretching": 3e5, "thickness": 1e-3, "bending": 2e-6 },
@@ -116,7 +116,8 @@ Scene expected_every_key() {
   scene.gravity = {1, 2, 3};
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;
-  scene.solver = {"vanilla_pd", "single", "jacobi", 5, {1, 1, 1, 0.5, 0.25}, 0.5, "recursive", 3};
+  scene.solver = {"vanilla_pd",  "single", "jacobi", 5, {1, 1, 1, 0.5, 0.25}, 0.5, "recursive", 3,
+                  "unprojected", "pcg",    0.75};
   scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single", "reference"};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();

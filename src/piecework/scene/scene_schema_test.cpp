@@ -221,6 +221,9 @@ TEST(SceneSchema, DefaultsAreThoseOfTheStructs) {
   EXPECT_EQ(default_of("solver.local"), solver.local);
   EXPECT_EQ(default_of("solver.domains"), solver.domains);
   EXPECT_EQ(default_of("solver.threads"), solver.threads);
+  EXPECT_EQ(default_of("solver.hessian"), solver.hessian);
+  EXPECT_EQ(default_of("solver.linear"), solver.linear);
+  EXPECT_EQ(default_of("solver.chebyshev_rho"), "none");
   const Quality quality;
   EXPECT_EQ(default_of("quality.stop"), quality.stop);
   EXPECT_EQ(default_of("quality.tolerance"), quality.tolerance);

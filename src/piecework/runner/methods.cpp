@@ -1,0 +1,137 @@
+#include <piecework/runner/methods.hpp>
+
+#include <utility>
+
+#include <piecework/baselines/newton.hpp>
+#include <piecework/baselines/pd_jacobi.hpp>
+#include <piecework/baselines/vanilla_pd.hpp>
+#include <piecework/baselines/xpbd.hpp>
+#include <piecework/pd/dd_pd.hpp>
+#include <piecework/pd/primal_dual_step.hpp>
+
+namespace piecework::runner {
+namespace {
+
+model::StopRule stop_rule(const std::string& name) {
+  if (name == "gradient") return model::StopRule::Gradient;
+  if (name == "dx_2") return model::StopRule::Dx2;
+  if (name == "dx_rms") return model::StopRule::DxRms;
+  if (name == "dx_inf") return model::StopRule::DxInf;
+  if (name == "iterations") return model::StopRule::Iterations;
+  return model::StopRule::Error;
+}
+
+global::Precision tree_precision(const scene::Scene& scene) {
+  const std::string& asked = scene.quality.precision;
+  const bool single = asked == "single" || (asked == "automatic" && scene.solver.method == "dd_pd");
+  return single ? global::Precision::Single : global::Precision::Double;
+}
+
+pd::AccelerationOptions acceleration(const scene::Quality& quality) {
+  using enum pd::AccelerationKind;
+  pd::AccelerationOptions options{.kind = Lbfgs, .window = quality.window};
+  if (quality.accelerate == "none") options.kind = None;
+  if (quality.accelerate == "chebyshev") options.kind = Chebyshev;
+  if (quality.accelerate == "anderson") options.kind = Anderson;
+  return options;
+}
+
+/// What every method is made from.
+struct MethodContext {
+  const World& world;
+  double gravity;  ///< magnitude, m/s^2
+  model::StopOptions stop;
+};
+
+MethodContext method_context(const World& world) {
+  constexpr double kStandardGravity = 9.81;  // m/s^2: turns forces into weights where there is none
+  const double gravity = world.forces.gravity ? world.forces.gravity->norm() : 0;
+  const scene::Quality& quality = world.scene.quality;
+  return {world,
+          gravity > 0 ? gravity : kStandardGravity,
+          {.rule = stop_rule(quality.stop),
+           .tolerance = quality.tolerance,
+           .max_iterations = quality.max_iterations,
+           .min_iterations = quality.min_iterations}};
+}
+
+std::unique_ptr<model::Minimizer> make_newton(const MethodContext& context) {
+  const scene::Solver& solver = context.world.scene.solver;
+  return std::make_unique<baselines::Newton>(
+      context.world.model, context.world.scene.step.h, context.gravity, context.stop,
+      baselines::NewtonOptions{
+          .hessian = solver.hessian == "unprojected" ? model::HessianForm::Unprojected
+                                                     : model::HessianForm::Projected,
+          .linear = solver.linear == "pcg" ? baselines::NewtonLinear::Pcg
+                                           : baselines::NewtonLinear::Cholmod});
+}
+
+std::unique_ptr<model::Minimizer> make_vanilla_pd(const MethodContext& context) {
+  return std::make_unique<baselines::VanillaPd>(context.world.model, context.world.scene.step.h,
+                                                context.gravity, context.stop,
+                                                make_exact_solver(context.world));
+}
+
+std::unique_ptr<model::Minimizer> make_pd_jacobi(const MethodContext& context) {
+  return std::make_unique<baselines::PdJacobi>(
+      context.world.model, context.world.scene.step.h, context.gravity, context.stop,
+      baselines::PdJacobiOptions{.rho = context.world.scene.solver.chebyshev_rho,
+                                 .gamma = std::nullopt});
+}
+
+std::unique_ptr<model::Minimizer> make_xpbd(const MethodContext& context) {
+  return std::make_unique<baselines::Xpbd>(context.world.model, context.world.scene.step.h,
+                                           context.gravity, context.stop);
+}
+
+std::unique_ptr<model::Minimizer> make_dd_pd(const MethodContext& context) {
+  const scene::Scene& scene = context.world.scene;
+  return std::make_unique<pd::DdPd>(
+      context.world.model,
+      pd::DdPdOptions{.h = scene.step.h,
+                      .gravity = context.gravity,
+                      .stop = context.stop,
+                      .acceleration = acceleration(scene.quality),
+                      .normals = scene.quality.accelerate == "lbfgs_kn" ? pd::NormalPart::Automatic
+                                                                        : pd::NormalPart::Never},
+      make_exact_solver(context.world));
+}
+
+}  // namespace
+
+std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
+  const scene::Solver& solver = world.scene.solver;
+  if (solver.global == "single") return global::make_cholmod_solver();
+  if (solver.global == "primal_dual") {
+    pd::PrimalDualStepOptions options{.corner_fraction = solver.corner_fraction};
+    options.solver.interface = solver.interface == "dense"    ? global::InterfaceKind::Dense
+                               : solver.interface == "sparse" ? global::InterfaceKind::Sparse
+                                                              : global::InterfaceKind::Recursive;
+    return pd::make_primal_dual_solver(world.model, world.domains, world.scene.step.h, options);
+  }
+  global::VertexTree domains;
+  if (world.domains.num_domains > 1) {
+    for (const auto& node : world.domains.nodes) domains.node_parent.push_back(node.parent);
+    domains.vertex_node = world.domains.vertex_node;
+  }
+  return global::make_tree_solver(std::move(domains), {.precision = tree_precision(world.scene)});
+}
+
+std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
+  const MethodContext context = method_context(world);
+  const std::string& method = world.scene.solver.method;
+  if (method == "vanilla_pd") return make_vanilla_pd(context);
+  if (method == "newton") return make_newton(context);
+  if (method == "pd_jacobi") return make_pd_jacobi(context);
+  if (method == "xpbd") return make_xpbd(context);
+  return make_dd_pd(context);
+}
+
+std::unique_ptr<model::Integrator> make_integrator(const World& world) {
+  return std::make_unique<model::Integrator>(
+      world.model, world.forces, world.pins,
+      model::IntegratorOptions{.h = world.scene.step.h, .damping = world.scene.damping},
+      make_minimizer(world));
+}
+
+}  // namespace piecework::runner

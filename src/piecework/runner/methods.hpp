@@ -1,0 +1,22 @@
+#pragma once
+
+// The solver that a scene names, made for its world.
+
+#include <memory>
+
+#include <piecework/global/exact_solver.hpp>
+#include <piecework/model/integrator.hpp>
+#include <piecework/runner/world.hpp>
+
+namespace piecework::runner {
+
+/// The exact global solve that the scene asks for, not yet factored. \pre `world` outlives it.
+std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world);
+
+/// The method that the scene asks for. \pre `world` outlives it.
+std::unique_ptr<model::Minimizer> make_minimizer(const World& world);
+
+/// The integrator that the scene asks for. \pre `world` outlives it.
+std::unique_ptr<model::Integrator> make_integrator(const World& world);
+
+}  // namespace piecework::runner
