@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/SVD>
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
+#include <Eigen/SVD>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/local/jacobi.hpp>
@@ -30,10 +30,9 @@ struct Case {
   std::vector<char> fixed;
 
   explicit Case(std::int64_t vertices)
-      : mesh(mesh::generate(mesh::GeneratorKind::Sheet,
-                            {.columns = side_of(vertices),
-                             .rows = side_of(vertices),
-                             .pattern = mesh::SheetPattern::Delaunay})
+      : mesh(mesh::generate(mesh::GeneratorKind::Sheet, {.columns = side_of(vertices),
+                                                         .rows = side_of(vertices),
+                                                         .pattern = mesh::SheetPattern::Delaunay})
                  .mesh),
         model(testing::cloth_model(mesh, testing::cotton())),
         fixed(static_cast<std::size_t>(mesh.num_vertices()), 0) {
@@ -62,7 +61,8 @@ class SvdStep {
 
   double evaluate(const Positions& x, const model::StepProblem& problem, Positions& gradient) {
     gradient.resize(x.rows(), 3);
-    return parallel_sum<double>(model_.stretch.size(), [&](std::size_t t) { return stretch(t, x); }) +
+    return parallel_sum<double>(model_.stretch.size(),
+                                [&](std::size_t t) { return stretch(t, x); }) +
            parallel_sum<double>(model_.bend.size(), [&](std::size_t i) { return bend(i, x); }) +
            parallel_sum<double>(uses_.size(),
                                 [&](std::size_t v) { return gather(v, x, problem, gradient); });

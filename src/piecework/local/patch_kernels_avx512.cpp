@@ -92,8 +92,7 @@ struct Avx512Lanes : AvxRows {
     rows_of(f, r1);
     rows_of(f + 3, r2);
     for (int k = 0; k < 4; ++k) {
-      add_pair(force, corners.corner[0], k,
-               _mm512_sub_pd(zero(), _mm512_add_pd(r1[k], r2[k])));
+      add_pair(force, corners.corner[0], k, _mm512_sub_pd(zero(), _mm512_add_pd(r1[k], r2[k])));
       add_pair(force, corners.corner[1], k, r1[k]);
       add_pair(force, corners.corner[2], k, r2[k]);
     }

@@ -58,8 +58,7 @@ struct PlainLanes {
 
   static Mask usable(const V& s, const V& limit, const V& scale) {
     Mask mask;
-    for (int i = 0; i < 4; ++i)
-      mask.set[i] = s.v[i] > limit.v[i] && scale.v[i] <= __DBL_MAX__;
+    for (int i = 0; i < 4; ++i) mask.set[i] = s.v[i] > limit.v[i] && scale.v[i] <= __DBL_MAX__;
     return mask;
   }
   static V keep(const Mask& mask, const V& v) {
