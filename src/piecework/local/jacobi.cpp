@@ -4,29 +4,13 @@
 #include <cmath>
 
 #include <piecework/core/parallel.hpp>
-#include <piecework/model/projection.hpp>
 
 #include "patch_kernels.hpp"
 #include "patches.hpp"
+#include "projections.hpp"
 
 namespace piecework::local {
 namespace {
-
-Mat32 deformation_gradient(const model::StretchConstraint& c, const Positions& x) {
-  Mat32 edges;
-  edges.col(0) = (x.row(c.vertices[1]) - x.row(c.vertices[0])).transpose();
-  edges.col(1) = (x.row(c.vertices[2]) - x.row(c.vertices[0])).transpose();
-  return edges * c.rest_inverse;
-}
-
-/// Orientation for a degenerate triangle: at the start of the step, else in the start shape.
-Mat32 reference_isometry(const model::StretchConstraint& c, const Positions& previous,
-                         const Positions& start) {
-  Mat32 reference = Mat32::Identity();
-  if (!model::closest_isometry(deformation_gradient(c, previous), reference))
-    model::closest_isometry(deformation_gradient(c, start), reference);
-  return reference;
-}
 
 struct alignas(64) Line {
   double number[8];
