@@ -20,7 +20,8 @@ using Mat4 = Eigen::Matrix4d;
 /// A projection or A x: two columns for triangles, one for hinges.
 using Value = Mat32;
 
-/// A constraint that is projected: A maps the positions of its vertices to columns of three numbers.
+/// A constraint that is projected: A maps the positions of its vertices to columns of three
+/// numbers.
 struct Node {
   std::array<int, 4> vertex;           ///< -1: none
   std::array<int, 4> inner;            ///< its number in the domain, -1 if it never moves
@@ -51,8 +52,7 @@ Node triangle_node(const model::ClothModel& model, int t) {
 Node hinge_node(const model::BendConstraint& c) {
   Node n{c.vertices, {}, {}, c.weight, -1, c.rest_length};
   n.weight.setZero();
-  for (std::size_t k = 0; k < 4; ++k)
-    n.weight(static_cast<Eigen::Index>(k), 0) = c.coefficient[k];
+  for (std::size_t k = 0; k < 4; ++k) n.weight(static_cast<Eigen::Index>(k), 0) = c.coefficient[k];
   return n;
 }
 
@@ -116,9 +116,8 @@ GaussSeidel::Impl::Impl(const model::ClothModel& m, const decomposition::Decompo
         copy_rows(domain, K);
         std::vector<std::array<int, 4>> vertices;
         for (const Node& n : domain.nodes) vertices.push_back(n.vertex);
-        domain.orders = depth_first_orders(vertices, prescribed,
-                                           options.fixed_order ? 1 : options.num_orders,
-                                           options.seed);
+        domain.orders = depth_first_orders(
+            vertices, prescribed, options.fixed_order ? 1 : options.num_orders, options.seed);
         domain.residual.resize(domain.vertex.size());
         domain.target.resize(domain.nodes.size());
       },
@@ -137,9 +136,9 @@ void GaussSeidel::Impl::number_inner(const decomposition::Decomposition& d) {
     const int first = d.vertex_domains.begin[v];
     if (d.vertex_domains.begin[v + 1] - first != 1) interior[v] = 0;
     if (interior[v] == 0) continue;
-    auto& own = domains[static_cast<std::size_t>(
-                            d.vertex_domains.item[static_cast<std::size_t>(first)])]
-                    .vertex;
+    auto& own =
+        domains[static_cast<std::size_t>(d.vertex_domains.item[static_cast<std::size_t>(first)])]
+            .vertex;
     number[v] = static_cast<int>(own.size());
     own.push_back(static_cast<int>(v));
   }
@@ -246,8 +245,8 @@ void GaussSeidel::Impl::begin(Domain& domain, const Positions& x,
   for (std::size_t i = 0; i < domain.vertex.size(); ++i) {
     const int v = domain.vertex[i];
     domain.residual[i].setZero();
-    domain.residual[i].head<3>() = model.mass[v] * inverse_h_sq *
-                                   (x.row(v) - problem.predicted->row(v)).transpose();
+    domain.residual[i].head<3>() =
+        model.mass[v] * inverse_h_sq * (x.row(v) - problem.predicted->row(v)).transpose();
   }
   const auto add = [&](const Node& n, const Value& difference) {
     for (std::size_t k = 0; k < 4; ++k)
@@ -328,8 +327,8 @@ void GaussSeidel::sweep(Positions& x, const model::StepProblem& problem, int ite
       [&](std::size_t j) {
         Domain& domain = impl.domains[j];
         if (!literal) impl.begin(domain, x, problem);
-        const auto& order = domain.orders[static_cast<std::size_t>(iteration) %
-                                          domain.orders.size()];
+        const auto& order =
+            domain.orders[static_cast<std::size_t>(iteration) % domain.orders.size()];
         for (const int node : order) {
           if (literal)
             impl.relax_literally(domain, static_cast<std::size_t>(node), x, problem);

@@ -32,8 +32,8 @@ struct SweepOptions {
   std::uint64_t seed = 1;
 };
 
-/// Sweeps over the constraints that have a projection (triangles and curved hinges; flat hinges have
-/// none and act through K). In a domain, for each constraint i in depth-first order:
+/// Sweeps over the constraints that have a projection (triangles and curved hinges; flat hinges
+/// have none and act through K). In a domain, for each constraint i in depth-first order:
 ///     y_i <- P_i(x);   b += w_i A_i^T (y_i - y_i_old);   x_i <- K_ii^-1 (b_i - K_i,rest x_rest)
 /// for those of its vertices that only this domain moves. Vertices of two and more domains,
 /// prescribed ones, slaves of seams and what carries them stay where they are: so domains share

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
+#include <Eigen/SVD>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/local/constraint_orders.hpp>
@@ -103,8 +104,8 @@ TEST_P(OnFlatAndCurved, MinimisersAreFixedPoints) {
   }
 }
 
-// One domain: sweeps alone. Several: the global step moves what is frozen. Fewer iterations than the
-// global step needs by itself.
+// One domain: sweeps alone. Several: the global step moves what is frozen. Fewer iterations than
+// the global step needs by itself.
 TEST_P(OnFlatAndCurved, ConvergesToTheMinimiser) {
   for (const int domains : {1, 3}) {
     const Cloth c = cloth(domains);
@@ -173,6 +174,68 @@ TEST_P(OnFlatAndCurved, TheLiteralFormIsBiased) {
 
 INSTANTIATE_TEST_SUITE_P(GaussSeidel, OnFlatAndCurved, ::testing::Bool());
 
+/// The sweep as it is written down, with the dense system and positions instead of increments:
+///     y_i <- P_i(x),   b = M/h^2 z + sum w A^T y,   K_ii x_i = b_i - K_i,rest x_rest.
+/// Triangles and flat hinges, whose y is zero.
+Positions dense_sweep(const Cloth& c, const std::vector<int>& order) {
+  const Eigen::MatrixXd K = assemble_system(c.model, kH);
+  Eigen::MatrixXd x = c.x;
+  const auto strain_rows = [&](int t) {  // A of a triangle: 2 x |V|
+    const model::StretchConstraint& s = c.model.stretch[static_cast<std::size_t>(t)];
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(2, x.rows());
+    A.col(s.vertices[1]) = s.rest_inverse.row(0).transpose();
+    A.col(s.vertices[2]) = s.rest_inverse.row(1).transpose();
+    A.col(s.vertices[0]) = -A.col(s.vertices[1]) - A.col(s.vertices[2]);
+    return A;
+  };
+  const auto project = [&](int t) {  // y: 2 x 3
+    const Eigen::Matrix<double, 3, 2> F = (strain_rows(t) * x).transpose();
+    const Eigen::JacobiSVD<Mat32> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    return Eigen::MatrixXd(svd.matrixV() * svd.matrixU().leftCols<2>().transpose());
+  };
+  std::vector<Eigen::MatrixXd> y;
+  for (int t = 0; t < static_cast<int>(c.model.stretch.size()); ++t) y.push_back(project(t));
+  for (const int t : order) {
+    y[static_cast<std::size_t>(t)] = project(t);
+    Eigen::MatrixXd residual = K * x;
+    for (Eigen::Index v = 0; v < x.rows(); ++v)
+      residual.row(v) -= c.model.mass[v] / (kH * kH) * c.z.row(v);
+    for (std::size_t s = 0; s < y.size(); ++s)
+      residual -= c.model.stretch[s].weight * strain_rows(static_cast<int>(s)).transpose() * y[s];
+    std::vector<int> moving;
+    for (const int v : c.model.stretch[static_cast<std::size_t>(t)].vertices)
+      if (c.fixed[static_cast<std::size_t>(v)] == 0) moving.push_back(v);
+    const Eigen::MatrixXd block = K(moving, moving);
+    const Eigen::MatrixXd step = block.ldlt().solve(residual(moving, Eigen::all).eval());
+    for (std::size_t i = 0; i < moving.size(); ++i)
+      x.row(moving[i]) -= step.row(static_cast<Eigen::Index>(i));
+  }
+  return x;
+}
+
+TEST(GaussSeidel, IsTheSweepThatIsWrittenDown) {
+  const Cloth c(testing::grid_mesh(7, 6), 1e-2, 1, 0.05);
+  std::vector<std::array<int, 4>> vertices;
+  for (const Triangle& t : c.model.triangles) vertices.push_back({t[0], t[1], t[2], -1});
+  const SweepOptions options{.num_orders = 3};
+  const auto orders = depth_first_orders(vertices, c.fixed, options.num_orders, options.seed);
+  GaussSeidel sweeps = c.sweeps(options);
+  for (const int iteration : {0, 1, 5}) {
+    Positions x = c.x;
+    sweeps.sweep(x, c.problem(), iteration);
+    EXPECT_LT(
+        (x - dense_sweep(c, orders[static_cast<std::size_t>(iteration % 3)])).cwiseAbs().maxCoeff(),
+        1e-12);
+  }
+  Positions alternating = c.x;
+  Positions fixed_order = c.x;
+  sweeps.sweep(alternating, c.problem(), 1);
+  GaussSeidel fixed = c.sweeps({.fixed_order = true});
+  fixed.sweep(fixed_order, c.problem(), 1);
+  EXPECT_LT((fixed_order - dense_sweep(c, orders[0])).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_GT((fixed_order - alternating).cwiseAbs().maxCoeff(), 1e-6);
+}
+
 TEST(GaussSeidel, BordersPinsAndSeamsStay) {
   const auto patches = testing::four_patches();
   auto model = testing::cloth_model(testing::patchwork(patches), testing::cotton(1e-3));
@@ -180,10 +243,9 @@ TEST(GaussSeidel, BordersPinsAndSeamsStay) {
                                                    model.num_vertices(), testing::plain_names()),
                                model.start);
   const auto neighbors = mesh::seam_neighbors(model.triangles, model.sewing.map());
-  const auto d = decomposition::decompose(
-      {model.triangles, model.hinges, model.hinge_bends, model.num_vertices(),
-       &model.sewing.map(), neighbors},
-      {.domains = 5});
+  const auto d = decomposition::decompose({model.triangles, model.hinges, model.hinge_bends,
+                                           model.num_vertices(), &model.sewing.map(), neighbors},
+                                          {.domains = 5});
   std::vector<char> fixed(static_cast<std::size_t>(model.num_vertices()), 0);
   const Positions start = model.start + testing::random_positions(model.num_vertices(), 0.02, 1);
   GaussSeidel sweeps(model, d, fixed, kH);
