@@ -33,10 +33,13 @@ struct Node {
 
 /// A x, by differences to vertex 0.
 Value strain(const Node& n, const Positions& x) {
-  Value value = Value::Zero();
   const Vec3 x0 = x.row(n.vertex[0]).transpose();
-  for (std::size_t k = 1; k < 4 && n.vertex[k] >= 0; ++k)
-    value += (x.row(n.vertex[k]).transpose() - x0) * n.weight.row(static_cast<Eigen::Index>(k));
+  const Vec3 e1 = x.row(n.vertex[1]).transpose() - x0;
+  const Vec3 e2 = x.row(n.vertex[2]).transpose() - x0;
+  Value value;
+  value.col(0) = n.weight(1, 0) * e1 + n.weight(2, 0) * e2;
+  value.col(1) = n.weight(1, 1) * e1 + n.weight(2, 1) * e2;
+  if (n.vertex[3] >= 0) value.col(0) += n.weight(3, 0) * (x.row(n.vertex[3]).transpose() - x0);
   return value;
 }
 
@@ -67,7 +70,7 @@ struct Domain {
   std::vector<int> row_begin;
   std::vector<Entry> entries;  ///< K between inner vertices, N/m
   std::vector<Node> nodes;
-  std::vector<int> flat;      ///< bending constraints without a projection
+  std::vector<Node> flat;     ///< hinges without a projection
   std::vector<Mat4> inverse;  ///< per node: K_ii^-1, zero where nothing moves; LiteralEq12: its own
   std::vector<std::vector<int>> orders;
   std::vector<Vec4> residual;  ///< K x - b of inner vertices, N; the fourth number is void
@@ -145,21 +148,20 @@ void GaussSeidel::Impl::number_inner(const decomposition::Decomposition& d) {
 }
 
 void GaussSeidel::Impl::distribute(const decomposition::Decomposition& d) {
-  const auto add = [&](int domain, Node n) {
+  const auto numbered = [&](Node n) {
     for (std::size_t k = 0; k < 4; ++k)
       n.inner[k] = n.vertex[k] < 0 ? -1 : number[static_cast<std::size_t>(n.vertex[k])];
-    domains[static_cast<std::size_t>(domain)].nodes.push_back(n);
+    return n;
   };
   for (std::size_t t = 0; t < model.stretch.size(); ++t)
-    add(d.triangle_domain[t], triangle_node(model, static_cast<int>(t)));
+    domains[static_cast<std::size_t>(d.triangle_domain[t])].nodes.push_back(
+        numbered(triangle_node(model, static_cast<int>(t))));
   std::size_t bend = 0;
   for (std::size_t i = 0; i < model.hinges.size(); ++i) {
     if (model.hinge_bends[i] == 0) continue;
-    const model::BendConstraint& c = model.bend[bend];
-    if (c.rest_length > 0)
-      add(d.hinge_domain[i], hinge_node(c));
-    else
-      domains[static_cast<std::size_t>(d.hinge_domain[i])].flat.push_back(static_cast<int>(bend));
+    const Node n = numbered(hinge_node(model.bend[bend]));
+    Domain& domain = domains[static_cast<std::size_t>(d.hinge_domain[i])];
+    (n.rest_length > 0 ? domain.nodes : domain.flat).push_back(n);
     ++bend;
   }
 }
@@ -259,11 +261,7 @@ void GaussSeidel::Impl::begin(Domain& domain, const Positions& x,
     domain.target[i] = project(domain.nodes[i], value, problem);
     add(domain.nodes[i], value - domain.target[i]);
   }
-  for (const int b : domain.flat) {
-    Node n = hinge_node(model.bend[static_cast<std::size_t>(b)]);
-    for (std::size_t k = 0; k < 4; ++k) n.inner[k] = number[static_cast<std::size_t>(n.vertex[k])];
-    add(n, strain(n, x));
-  }
+  for (const Node& n : domain.flat) add(n, strain(n, x));
 }
 
 void GaussSeidel::Impl::relax(Domain& domain, std::size_t node, Positions& x,
@@ -272,18 +270,21 @@ void GaussSeidel::Impl::relax(Domain& domain, std::size_t node, Positions& x,
   const Value y = project(n, strain(n, x), problem);
   const Value change = n.stiffness * (y - domain.target[node]);
   domain.target[node] = y;
-  Eigen::Matrix4d r = Eigen::Matrix4d::Zero();  // one row per vertex
+  Mat4 r = Mat4::Zero();  // one column per vertex
   for (std::size_t k = 0; k < 4; ++k) {
     if (n.inner[k] < 0) continue;
     Vec4& residual = domain.residual[static_cast<std::size_t>(n.inner[k])];
-    const auto row = static_cast<Eigen::Index>(k);
-    residual.head<3>() -= change * n.weight.row(row).transpose();
-    r.row(row) = residual.transpose();
+    const auto column = static_cast<Eigen::Index>(k);
+    residual.head<3>() -= change.col(0) * n.weight(column, 0) + change.col(1) * n.weight(column, 1);
+    r.col(column) = residual;
   }
-  const Eigen::Matrix4d step = -domain.inverse[node] * r;
+  const Mat4& inverse = domain.inverse[node];
   for (std::size_t k = 0; k < 4; ++k) {
     if (n.inner[k] < 0) continue;
-    const Vec4 dx = step.row(static_cast<Eigen::Index>(k)).transpose();
+    const auto column = static_cast<Eigen::Index>(k);
+    Vec4 dx = -(inverse(0, column) * r.col(0) + inverse(1, column) * r.col(1) +
+                inverse(2, column) * r.col(2));
+    if (n.vertex[3] >= 0) dx -= inverse(3, column) * r.col(3);
     x.row(n.vertex[k]) += dx.head<3>().transpose();
     const auto row = static_cast<std::size_t>(n.inner[k]);
     for (int e = domain.row_begin[row]; e < domain.row_begin[row + 1]; ++e) {
