@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include <piecework/core/parallel.hpp>
-#include <piecework/model/projection.hpp>
 
 #include "patch_kernels.hpp"
 #include "patches.hpp"
+#include "projections.hpp"
 
 namespace piecework::local {
 namespace {
@@ -16,7 +16,7 @@ struct alignas(64) Line {
   double number[8];
 };
 
-/// What one thread works in: it stays in the nearest cache from patch to patch.
+/// What one thread works in: it stays in the nearest caches from patch to patch.
 struct Scratch {
   std::vector<Line> x, force;  ///< rows of four numbers, two per line
   std::vector<int> degenerate;

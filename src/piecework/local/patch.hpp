@@ -1,12 +1,12 @@
 #pragma once
 
 // Constraints in patches: pieces of cloth small enough that the positions and forces of one stay
-// in the nearest cache while all its constraints are evaluated. Private to `local`.
+// in the nearest caches while all its constraints are evaluated. Private to `local`.
 //
 // A patch numbers its vertices from 0; elements name them by 16 bits and add their forces into rows
 // of the patch. So a triangle costs 38 bytes of memory traffic and a flat hinge 32, and only the
-// rim of a patch (about a fifth of the vertices) goes through memory once more. A list of element
-// forces that vertices gather costs 144 and 24 bytes on top, written and read again.
+// rim of a patch (a tenth to a fifth of the vertices) goes through memory once more. A list of
+// element forces that vertices gather costs 144 and 24 bytes on top, written and read again.
 
 #include <cstdint>
 
