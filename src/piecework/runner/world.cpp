@@ -257,6 +257,7 @@ std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
   if (solver.global == "single") return global::make_cholmod_solver();
   if (solver.global == "primal_dual") {
     pd::PrimalDualStepOptions options{.corner_fraction = solver.corner_fraction};
+    options.seams = solver.seams == "dual" ? pd::SeamForm::Dual : pd::SeamForm::Elimination;
     options.solver.interface = solver.interface == "dense"    ? global::InterfaceKind::Dense
                                : solver.interface == "sparse" ? global::InterfaceKind::Sparse
                                                               : global::InterfaceKind::Recursive;

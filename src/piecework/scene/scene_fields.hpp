@@ -365,6 +365,12 @@ void fields(V& v, Solver& s) {
            {{"recursive", "sparse, by nested dissection, in parallel"},
             {"sparse", "sparse, by CHOLMOD on one thread"},
             {"dense", "dense, as the paper says; memory grows with vertices times domains"}});
+  v.choice(
+      {"seams", "how sewn vertices follow what carries them"}, s.seams,
+      {{"elimination", "they have no unknowns; what acts on them acts on what carries them"},
+       {"dual",
+        "with `global: primal_dual` only: they keep unknowns of their own, and multipliers hold "
+        "them in place, as the paper has it (corrected)"}});
   v.value({"threads", "worker threads; 0: what affinity and cgroup quota allow"}, s.threads,
           between(0, 1024));
 }

@@ -149,6 +149,12 @@ void check_domain_weights(const Solver& solver, const Part& part) {
                "write one per domain, or [] for equal domains");
 }
 
+void check_seam_form(const Solver& solver, const Part& part) {
+  part.require(solver.seams != "dual" || solver.global == "primal_dual",
+               fmt::format("multipliers on seams, but \"global\" is \"{}\"", solver.global),
+               "write \"elimination\", or choose \"primal_dual\" for \"global\"");
+}
+
 /// A misspelt override must not pass as the definition of a new material.
 void check_overridden_materials(const Scene& scene, const Document& document, const Part& part) {
   std::vector<std::string> used;
@@ -169,6 +175,7 @@ void check_rules(const Scene& scene, const Document& document) {
   check_order(root.in("quality").in("max_iterations"), scene.quality.min_iterations,
               scene.quality.max_iterations, "min_iterations", "max_iterations");
   check_domain_weights(scene.solver, root.in("solver").in("domain_weights"));
+  check_seam_form(scene.solver, root.in("solver").in("seams"));
   root.in("step")
       .in("output_every")
       .require(
