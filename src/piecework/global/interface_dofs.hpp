@@ -149,9 +149,8 @@ struct InterfaceDofs {
 /// that the same two domains share, walked breadth first from an end. A function of the patterns
 /// only.
 /// \param num_rows  n, rows of the whole; 0 is allowed.
-/// \param seams     of rows: slaves keep rows of their own, and multipliers tie them to what
-/// carries
-///                  them; weights need not sum to 1 (of what is held, nothing is said)
+/// \param seams     of rows: slaves keep rows of their own, tied by multipliers to what carries
+///                  them; weights need not sum to 1 (what is held has no row)
 /// \throws InputError if an option is out of range, a matrix does not fit its rows, rows are not
 ///         ascending in [0, num_rows), a row belongs to no domain, or the seams are not of these
 ///         rows.

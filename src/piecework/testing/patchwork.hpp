@@ -34,7 +34,8 @@ Eigen::MatrixXd constraint_rows(const std::vector<mesh::Stitch>& stitches, int n
 Eigen::MatrixXd constraint_rows(const mesh::SeamMap& seams);
 
 /// argmin x^T K x / 2 - b^T x under C x = 0, by one dense solve with multipliers: shares nothing
-/// with the elimination or with domains. \pre the rows of C are independent.
+/// with the elimination or with domains.
+/// \pre the rows of C are independent.
 Eigen::MatrixXd solve_with_multipliers(const Eigen::MatrixXd& K, const Eigen::MatrixXd& b,
                                        const Eigen::MatrixXd& C);
 
