@@ -163,6 +163,27 @@ double error(const global::RightHandSides& x, const global::RightHandSides& expe
   return (x - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
 }
 
+// One slave alone may bring both its carriers into a domain, which then is theirs by mass.
+TEST(DualSeams, EliminationInSharesSolvesThemAll) {
+  for (const Sewn& sewn : everything()) {
+    const Case c(sewn);
+    for (const int domains : {1, 2, 3, 8, 32}) {
+      const auto decomposition = decomposition::decompose(sewn.elements(), {.domains = domains});
+      for (const double fraction : {0.0, 0.5, 1.0}) {
+        SCOPED_TRACE(sewn.name + ", " + std::to_string(domains) + " domains, fraction " +
+                     std::to_string(fraction));
+        const auto solver = make_primal_dual_solver(
+            sewn.model, decomposition, kH,
+            {.corner_fraction = fraction, .solver = {.max_refinements = 0}});
+        global::RightHandSides x = c.b;
+        ASSERT_EQ(solver->factor(c.K, c.reduction.vertices()), global::SolveStatus::Ok);
+        ASSERT_EQ(solver->solve(x), global::SolveStatus::Ok);
+        EXPECT_LT(error(x, c.elimination), 1e-10);
+      }
+    }
+  }
+}
+
 TEST(DualSeams, EveryKindOfSeamAgreesWithEliminationAndMultipliers) {
   double worst = 0;
   for (const Sewn& sewn : everything()) {

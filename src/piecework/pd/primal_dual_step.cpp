@@ -37,17 +37,36 @@ mesh::SeamMap movable_seams(const mesh::SeamMap& seams, const model::FreeVertice
   return result;
 }
 
+/// Per vertex: the domains that get a part of its mass. When slaves are eliminated, what carries a
+/// slave appears in the slave's domains too, perhaps through that slave alone, and two carriers of
+/// one slave make a singular K^j there; their own part of the mass keeps it definite (D11).
+mesh::Adjacency sharing_domains(const model::ClothModel& model,
+                                const decomposition::Decomposition& domains, SeamForm seams) {
+  mesh::Adjacency own = owning_domains(model, domains);
+  if (seams == SeamForm::Dual || model.sewing.empty()) return own;
+  mesh::Adjacency result;
+  result.begin.push_back(0);
+  for (int v = 0; v < model.num_vertices(); ++v) {
+    const mesh::Adjacency& from = model.sewing.map().is_slave(v) ? own : domains.vertex_domains;
+    const auto i = static_cast<std::size_t>(v);
+    result.item.insert(result.item.end(), from.item.begin() + from.begin[i],
+                       from.item.begin() + from.begin[i + 1]);
+    result.begin.push_back(static_cast<int>(result.item.size()));
+  }
+  return result;
+}
+
 class PrimalDualStep final : public global::ExactSolver {
  public:
   PrimalDualStep(const model::ClothModel& model, const decomposition::Decomposition& domains,
                  double h, PrimalDualStepOptions options)
       : model_(model),
         options_(std::move(options)),
-        shares_(
-            model::assemble_domain_systems(model,
-                                           {domains.num_domains, domains.triangle_domain,
-                                            domains.hinge_domain, owning_domains(model, domains)},
-                                           h)) {}
+        shares_(model::assemble_domain_systems(
+            model,
+            {domains.num_domains, domains.triangle_domain, domains.hinge_domain,
+             sharing_domains(model, domains, options_.seams)},
+            h)) {}
 
   global::SolveStatus factor(const SparseMatrix& K, std::span<const int> row_vertex) override {
     std::vector<char> fixed(static_cast<std::size_t>(model_.num_vertices()), 1);

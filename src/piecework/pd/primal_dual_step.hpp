@@ -28,9 +28,11 @@ struct PrimalDualStepOptions {
 /// by multiplicity (docs/architecture.md, D11), held vertices and, with SeamForm::Elimination,
 /// slaves of seams are eliminated in each share. With SeamForm::Dual the unknowns stay those of K~;
 /// inside, every slave that can move is one more, its share of the right-hand side already with its
-/// carriers. The matrix given to factor() must be that of the model and step. \param model    must
-/// outlive the solver \param domains  of the model's elements \param h        time step, s \throws
-/// InputError from factor() if the interface is too large; see PrimalDual::factor().
+/// carriers. The matrix given to factor() must be that of the model and step.
+/// \param model    must outlive the solver
+/// \param domains  of the model's elements, the seams included
+/// \param h        time step, s
+/// \throws InputError from factor() if the interface is too large; see PrimalDual::factor().
 std::unique_ptr<global::ExactSolver> make_primal_dual_solver(
     const model::ClothModel& model, const decomposition::Decomposition& domains, double h,
     const PrimalDualStepOptions& options);
