@@ -117,4 +117,15 @@ SparseMatrix sum_matrices(std::span<const DomainMatrix> domains, int num_rows) {
   return K;
 }
 
+SparseMatrix fold_matrix(const SparseMatrix& K, const mesh::SeamMap& seams) {
+  Triplets triplets;
+  for (int row = 0; row < K.rows(); ++row)
+    seams.visit_carriers(
+        row, [&](int carrier, double weight) { triplets.emplace_back(row, carrier, weight); });
+  SparseMatrix T(K.rows(), K.cols());
+  T.setFromTriplets(triplets.begin(), triplets.end());
+  const SparseMatrix KT = K * T;
+  return T.transpose() * KT;
+}
+
 }  // namespace piecework::global

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <piecework/core/types.hpp>
+#include <piecework/mesh/seams.hpp>
 
 namespace piecework::global {
 
@@ -30,5 +31,8 @@ std::vector<DomainMatrix> split_matrix(const SparseMatrix& K, const RowDomains& 
 
 /// The sum of the shares, num_rows x num_rows. \pre rows lie in [0, num_rows).
 SparseMatrix sum_matrices(std::span<const DomainMatrix> domains, int num_rows);
+
+/// T^T K T, n x n, with empty rows and columns for slaves; the seams are of the rows of K.
+SparseMatrix fold_matrix(const SparseMatrix& K, const mesh::SeamMap& seams);
 
 }  // namespace piecework::global

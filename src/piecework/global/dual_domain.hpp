@@ -17,16 +17,16 @@ enum class DomainForm {
              ///< D14)
 };
 
-/// A domain's terms of G, without the signs of S_D^j, N_D^j duplicates and N_C^j corners.
+/// A domain's terms of G, without the entries of S_D^j, N_D^j dual rows and N_C^j corners.
 struct DomainBlocks {
   Eigen::MatrixXd RR;  ///< (K_RR^-1)_DD, N_D^j x N_D^j, m/N
   Eigen::MatrixXd RC;  ///< (K_RR^-1 K_RC)_D, N_D^j x N_C^j, 1
   Eigen::MatrixXd CC;  ///< K_CC - K_RC^T K_RR^-1 K_RC, N_C^j x N_C^j, N/m
 };
 
-/// K^j in the order [internal | duplicates | corners]; R = internal and duplicates. The vectors of
-/// reduce() and expand() have that order, size() x 3. analyze() runs for one domain at a time, the
-/// rest for different domains at the same time.
+/// K^j in the order [internal | dual | corners], dual rows being duplicates and sewn ones; R =
+/// internal and dual. The vectors of reduce() and expand() have that order, size() x 3. analyze()
+/// runs for one domain at a time, the rest for different domains at the same time.
 class DualDomain {
  public:
   DualDomain() = default;
@@ -38,7 +38,7 @@ class DualDomain {
   [[nodiscard]] virtual SolveStatus analyze(const SparseMatrix& K, const DomainDofs& dofs) = 0;
   /// Factors K_RR^j and writes the blocks. NotPositiveDefinite if K_RR^j is not.
   [[nodiscard]] virtual SolveStatus factorize(const SparseMatrix& K, DomainBlocks& blocks) = 0;
-  /// [b_I; b_D; 0] -> rows of duplicates (K_RR^-1 b_R)_D and of corners -K_RC^T K_RR^-1 b_R; what
+  /// [b_I; b_D; 0] -> dual rows (K_RR^-1 b_R)_D and of corners -K_RC^T K_RR^-1 b_R; what
   /// then stands in the internal rows belongs to expand().
   [[nodiscard]] virtual SolveStatus reduce(RightHandSides& work) = 0;
   /// [as reduce() left it; S_D^jT lambda; x_C] -> [x_I; x_D; x_C],

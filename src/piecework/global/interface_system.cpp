@@ -36,20 +36,19 @@ const DomainDofs& domain_of(const InterfaceDofs& dofs, const DofCopy& copy) {
   return dofs.domains[static_cast<std::size_t>(copy.domain)];
 }
 
-/// Calls add(other multiplier, signed entry) for the terms of one multiplier's column of G_RR, the
-/// lower domain first and ascending within each domain.
+/// Calls add(other multiplier, signed entry) for the terms of one multiplier's column of G_RR, copy
+/// by copy (for a duplicate: the lower domain first) and ascending for each.
 template <class Add>
 void for_column_terms(const InterfaceDofs& dofs, std::span<const DomainBlocks> blocks,
-                      std::size_t multiplier, const Add& add) {
-  for (const DofCopy& copy : dofs.duplicate_copies[multiplier]) {
+                      int multiplier, const Add& add) {
+  dofs.visit_copies(multiplier, [&](const DofCopy& copy, double own) {
     const DomainDofs& domain = domain_of(dofs, copy);
     const Eigen::MatrixXd& RR = blocks[static_cast<std::size_t>(copy.domain)].RR;
-    const auto column = static_cast<std::size_t>(copy.local - domain.num_internal);
-    for (std::size_t i = 0; i < domain.multiplier.size(); ++i)
-      add(domain.multiplier[i],
-          domain.sign[i] * domain.sign[column] *
-              RR(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(column)));
-  }
+    const Eigen::Index column = copy.local - domain.num_internal;
+    domain.visit_entries([&](int other, int dual, double coefficient) {
+      add(other, coefficient * own * RR(dual, column));
+    });
+  });
 }
 
 class DenseMultiplierSolver final : public MultiplierSolver {
@@ -57,9 +56,9 @@ class DenseMultiplierSolver final : public MultiplierSolver {
   SolveStatus factor(const InterfaceDofs& dofs, std::span<const DomainBlocks> blocks) override {
     Eigen::MatrixXd G = Eigen::MatrixXd::Zero(dofs.num_multipliers(), dofs.num_multipliers());
     parallel_for(
-        dofs.duplicate_rows.size(),
+        static_cast<std::size_t>(dofs.num_multipliers()),
         [&](std::size_t m) {
-          for_column_terms(dofs, blocks, m, [&](int row, double value) {
+          for_column_terms(dofs, blocks, static_cast<int>(m), [&](int row, double value) {
             G(row, static_cast<Eigen::Index>(m)) += value;
           });
         },
@@ -106,17 +105,17 @@ class SparseMultiplierSolver final : public MultiplierSolver {
     const bool known = G_.rows() == dofs.num_multipliers() && G_.nonZeros() > 0;
     if (!known) make_pattern(dofs);
     parallel_for(
-        dofs.duplicate_rows.size(),
+        static_cast<std::size_t>(dofs.num_multipliers()),
         [&](std::size_t m) {
           const int begin = G_.outerIndexPtr()[m];
           const int end = G_.outerIndexPtr()[m + 1];
           std::fill(G_.valuePtr() + begin, G_.valuePtr() + end, 0.0);
-          // Both lists of a column ascend: each domain's pass runs through the column once.
+          // All lists of a column ascend: each copy's pass runs through the column once.
           int place = begin;
           int last_row = -1;
-          for_column_terms(dofs, blocks, m, [&](int row, double value) {
+          for_column_terms(dofs, blocks, static_cast<int>(m), [&](int row, double value) {
             if (row < static_cast<int>(m)) return;
-            if (row <= last_row) place = begin;
+            if (row < last_row) place = begin;
             while (G_.innerIndexPtr()[place] != row) ++place;
             G_.valuePtr()[place] += value;
             last_row = row;
@@ -136,16 +135,21 @@ class SparseMultiplierSolver final : public MultiplierSolver {
  private:
   /// The lower triangle of G_RR: two multipliers meet if a domain has both.
   void make_pattern(const InterfaceDofs& dofs) {
+    std::vector<std::vector<int>> of_domain;
+    for (const DomainDofs& domain : dofs.domains) of_domain.push_back(domain.multipliers());
     std::vector<int> begin(1, 0);
     std::vector<int> item;
     std::vector<int> column;
+    std::vector<int> longer;
     for (int m = 0; m < dofs.num_multipliers(); ++m) {
-      const auto& copies = dofs.duplicate_copies[static_cast<std::size_t>(m)];
-      const std::vector<int>& a = domain_of(dofs, copies[0]).multiplier;
-      const std::vector<int>& b = domain_of(dofs, copies[1]).multiplier;
       column.clear();
-      std::set_union(std::lower_bound(a.begin(), a.end(), m), a.end(),
-                     std::lower_bound(b.begin(), b.end(), m), b.end(), std::back_inserter(column));
+      dofs.visit_copies(m, [&](const DofCopy& copy, double) {
+        const std::vector<int>& a = of_domain[static_cast<std::size_t>(copy.domain)];
+        longer.clear();
+        std::set_union(std::lower_bound(a.begin(), a.end(), m), a.end(), column.begin(),
+                       column.end(), std::back_inserter(longer));
+        column.swap(longer);
+      });
       item.insert(item.end(), column.begin(), column.end());
       begin.push_back(static_cast<int>(item.size()));
     }
@@ -159,17 +163,19 @@ class SparseMultiplierSolver final : public MultiplierSolver {
   Cholesky cholesky_;
 };
 
-/// G_RC = sum_j S_D^j (K_RR^j-1 K_RC^j)_D S_C^j, N_lambda x N_C.
+/// G_RC = sum_j S_D^j (K_RR^j-1 K_RC^j)_D S_C^j - E, N_lambda x N_C (B_C^j is in K_RC^j already).
 SparseMatrix sum_rc(const InterfaceDofs& dofs, std::span<const DomainBlocks> blocks) {
   std::vector<Eigen::Triplet<double, int>> triplets;
   for (std::size_t d = 0; d < dofs.domains.size(); ++d) {
     const DomainDofs& domain = dofs.domains[d];
     for (std::size_t c = 0; c < domain.corner.size(); ++c)
-      for (std::size_t i = 0; i < domain.multiplier.size(); ++i)
-        triplets.emplace_back(domain.multiplier[i], domain.corner[c],
-                              domain.sign[i] * blocks[d].RC(static_cast<Eigen::Index>(i),
-                                                            static_cast<Eigen::Index>(c)));
+      domain.visit_entries([&](int multiplier, int dual, double coefficient) {
+        triplets.emplace_back(multiplier, domain.corner[c],
+                              coefficient * blocks[d].RC(dual, static_cast<Eigen::Index>(c)));
+      });
   }
+  for (const SeamCorner& e : dofs.seam_corners)
+    triplets.emplace_back(e.multiplier, e.corner, -e.coefficient);
   SparseMatrix result(dofs.num_multipliers(), dofs.num_corners());
   result.setFromTriplets(triplets.begin(), triplets.end());
   return result;
@@ -202,8 +208,10 @@ void InterfaceSystem::check_size(const InterfaceDofs& dofs, const InterfaceOptio
   const auto multipliers = static_cast<double>(dofs.num_multipliers());
   const auto corners = static_cast<double>(dofs.num_corners());
   double blocks = 0;
-  for (const DomainDofs& domain : dofs.domains)
-    blocks += static_cast<double>(domain.num_duplicates) * domain.num_interface();
+  for (const DomainDofs& domain : dofs.domains) {
+    const auto of_domain = static_cast<double>(domain.multipliers().size());
+    blocks += of_domain * (of_domain + domain.num_corners);
+  }
   check_bytes(fmt::format("the dense corner matrix of {} corners", dofs.num_corners()),
               corners * corners * sizeof(double), limit,
               "lower corner_fraction or use fewer domains");

@@ -29,8 +29,11 @@ void check_domains(std::span<const DomainMatrix> domains, const InterfaceDofs& d
   for (std::size_t d = 0; fits && d < domains.size(); ++d) {
     std::vector<int> rows = dofs.domains[d].rows;
     std::sort(rows.begin(), rows.end());
-    const auto size = static_cast<Eigen::Index>(rows.size());
-    fits = rows == domains[d].rows && domains[d].K.rows() == size && domains[d].K.cols() == size;
+    const auto size = static_cast<Eigen::Index>(domains[d].rows.size());
+    fits = domains[d].K.rows() == size && domains[d].K.cols() == size &&
+           std::all_of(domains[d].rows.begin(), domains[d].rows.end(),
+                       [&](int row) { return row >= 0 && row < dofs.num_rows; }) &&
+           rows == dofs.unknowns(domains[d].rows);
   }
   if (!fits)
     throw InputError(
@@ -59,7 +62,36 @@ SolveStatus first_failure(const std::vector<SolveStatus>& statuses) {
   return SolveStatus::Ok;
 }
 
-/// K^j from ascending rows to the order [internal | duplicates | corners].
+/// b <- T^T b: in the order of the slaves, whose rows become zero.
+void fold(const mesh::SeamMap& seams, RightHandSides& b) {
+  for (const int slave : seams.slaves) {
+    seams.visit_carriers(
+        slave, [&](int carrier, double weight) { b.row(carrier) += weight * b.row(slave); });
+    b.row(slave).setZero();
+  }
+}
+
+/// B_C^jT K^j B_C^j in the order [internal | dual | corners]: as reorder(), and slaves that are
+/// corners are replaced by what carries them.
+SparseMatrix condense(const DomainMatrix& domain, const DomainDofs& domain_dofs,
+                      const InterfaceDofs& dofs) {
+  std::vector<std::pair<int, int>> place;  // (row, local), ascending
+  for (int local = 0; local < domain_dofs.size(); ++local)
+    place.emplace_back(domain_dofs.rows[static_cast<std::size_t>(local)], local);
+  std::sort(place.begin(), place.end());
+  std::vector<Eigen::Triplet<double, int>> triplets;
+  for (std::size_t i = 0; i < domain.rows.size(); ++i)
+    dofs.visit_unknowns(domain.rows[i], [&](int row, double weight) {
+      const auto found = std::lower_bound(place.begin(), place.end(), std::pair(row, 0));
+      triplets.emplace_back(static_cast<int>(i), found->second, weight);
+    });
+  SparseMatrix B(domain.K.rows(), domain_dofs.size());
+  B.setFromTriplets(triplets.begin(), triplets.end());
+  const SparseMatrix KB = domain.K * B;
+  return B.transpose() * KB;
+}
+
+/// K^j from ascending rows to the order [internal | dual | corners].
 SparseMatrix reorder(const DomainMatrix& domain, const DomainDofs& dofs) {
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> to_local(dofs.size());
   for (int local = 0; local < dofs.size(); ++local) {
@@ -87,7 +119,7 @@ struct PrimalDual::Impl {
 
   InterfaceDofs dofs;
   PrimalDualOptions options;
-  SparseMatrix K;     ///< the sum, for residuals
+  SparseMatrix K;     ///< the sum, for residuals; with seams T^T K T
   double norm_K = 0;  ///< ||K||_inf
   bool analyzed = false;
   bool factored = false;
@@ -98,6 +130,7 @@ struct PrimalDual::Impl {
   RightHandSides multipliers;        ///< b_R*, then lambda
   RightHandSides corners;            ///< b_C*, then x_C
   RightHandSides result;             ///< of solve(), so that b stays until all went well
+  RightHandSides folded;             ///< T^T b; empty without seams
   RightHandSides r;                  ///< of residual()
   PrimalDualReport report;
   PrimalDualTimes times;
@@ -108,9 +141,14 @@ std::vector<SparseMatrix> PrimalDual::Impl::prepare(std::span<const DomainMatrix
   factored = false;
   std::vector<SparseMatrix> ordered(matrices.size());
   parallel_for(
-      matrices.size(), [&](std::size_t d) { ordered[d] = reorder(matrices[d], dofs.domains[d]); },
+      matrices.size(),
+      [&](std::size_t d) {
+        ordered[d] = dofs.condensed_slaves.empty() ? reorder(matrices[d], dofs.domains[d])
+                                                   : condense(matrices[d], dofs.domains[d], dofs);
+      },
       1);
   K = sum_matrices(matrices, dofs.num_rows);
+  if (!dofs.seams.empty()) K = fold_matrix(K, dofs.seams);
   norm_K = parallel_max(static_cast<std::size_t>(K.cols()), [&](std::size_t column) {
     double sum = 0;
     for (SparseMatrix::InnerIterator it(K, static_cast<Eigen::Index>(column)); it; ++it)
@@ -124,12 +162,10 @@ SolveStatus PrimalDual::Impl::analyze(const std::vector<SparseMatrix>& matrices)
   analyzed = false;
   domains.clear();
   work.clear();
-  nonzeros.clear();
   interface = InterfaceSystem();
   for (std::size_t d = 0; d < matrices.size(); ++d) {
     domains.push_back(make_dual_domain(options.form, options.backend));
     work.emplace_back(RightHandSides::Zero(dofs.domains[d].size(), 3));
-    nonzeros.push_back(matrices[d].nonZeros());
     const SolveStatus status = domains[d]->analyze(matrices[d], dofs.domains[d]);
     if (status != SolveStatus::Ok) return status;
   }
@@ -148,6 +184,7 @@ SolveStatus PrimalDual::Impl::factorize(const std::vector<SparseMatrix>& matrice
       [&](std::size_t d) { statuses[d] = domains[d]->factorize(matrices[d], blocks[d]); }, 1);
   report.num_domains = static_cast<int>(domains.size());
   report.num_multipliers = dofs.num_multipliers();
+  report.num_seam_multipliers = static_cast<int>(dofs.seam_slaves.size());
   report.num_corners = dofs.num_corners();
   report.domains_ms = watch.lap();
   SolveStatus status = first_failure(statuses);
@@ -177,7 +214,9 @@ SolveStatus PrimalDual::Impl::reduce_domains(const RightHandSides& b) {
       [&](std::size_t d) {
         const DomainDofs& domain = dofs.domains[d];
         for (int i = 0; i < domain.size(); ++i) {
-          const double share = i < domain.num_internal ? 1 : i < domain.num_remainder() ? 0.5 : 0;
+          const bool is_duplicate =
+              i >= domain.num_internal && i < domain.num_internal + domain.num_duplicates;
+          const double share = is_duplicate ? 0.5 : i < domain.num_remainder() ? 1 : 0;
           work[d].row(i) = share * b.row(domain.rows[static_cast<std::size_t>(i)]);
         }
         statuses[d] = domains[d]->reduce(work[d]);
@@ -191,9 +230,12 @@ void PrimalDual::Impl::gather_interface(const RightHandSides& b) {
   const auto value = [&](const DofCopy& copy) {
     return work[static_cast<std::size_t>(copy.domain)].row(copy.local);
   };
-  parallel_for(dofs.duplicate_rows.size(), [&](std::size_t m) {
-    const auto& [plus, minus] = dofs.duplicate_copies[m];
-    multipliers.row(static_cast<Eigen::Index>(m)) = value(plus) - value(minus);
+  parallel_for(static_cast<std::size_t>(dofs.num_multipliers()), [&](std::size_t m) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    dofs.visit_copies(static_cast<int>(m), [&](const DofCopy& copy, double coefficient) {
+      sum += coefficient * value(copy);
+    });
+    multipliers.row(static_cast<Eigen::Index>(m)) = sum;
   });
   parallel_for(dofs.corner_rows.size(), [&](std::size_t c) {
     Eigen::RowVector3d sum = b.row(dofs.corner_rows[c]);
@@ -210,15 +252,19 @@ SolveStatus PrimalDual::Impl::expand_domains(RightHandSides& x) {
       domains.size(),
       [&](std::size_t d) {
         const DomainDofs& domain = dofs.domains[d];
-        for (std::size_t i = 0; i < domain.multiplier.size(); ++i)
-          work[d].row(domain.num_internal + static_cast<Eigen::Index>(i)) =
-              domain.sign[i] * multipliers.row(domain.multiplier[i]);
+        auto forces = work[d].middleRows(domain.num_internal, domain.num_dual());
+        forces.setZero();
+        domain.visit_entries([&](int multiplier, int dual, double coefficient) {
+          forces.row(dual) += coefficient * multipliers.row(multiplier);
+        });
         for (std::size_t i = 0; i < domain.corner.size(); ++i)
           work[d].row(domain.num_remainder() + static_cast<Eigen::Index>(i)) =
               corners.row(domain.corner[i]);
         statuses[d] = domains[d]->expand(work[d]);
-        for (int i = 0; i < domain.num_internal; ++i)
-          x.row(domain.rows[static_cast<std::size_t>(i)]) = work[d].row(i);
+        const int first_sewn = domain.num_internal + domain.num_duplicates;
+        for (int i = 0; i < domain.num_remainder(); ++i)
+          if (i < domain.num_internal || i >= first_sewn)
+            x.row(domain.rows[static_cast<std::size_t>(i)]) = work[d].row(i);
       },
       1);
   const auto value = [&](const DofCopy& copy) {
@@ -230,6 +276,12 @@ SolveStatus PrimalDual::Impl::expand_domains(RightHandSides& x) {
   });
   for (std::size_t c = 0; c < dofs.corner_rows.size(); ++c)
     x.row(dofs.corner_rows[c]) = corners.row(static_cast<Eigen::Index>(c));
+  for (const int slave : dofs.condensed_slaves) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    dofs.seams.visit_carriers(slave,
+                              [&](int carrier, double weight) { sum += weight * x.row(carrier); });
+    x.row(slave) = sum;
+  }
   return first_failure(statuses);
 }
 
@@ -312,6 +364,8 @@ SolveStatus PrimalDual::factor(std::span<const DomainMatrix> domains, InterfaceD
       if (!all_finite(domain.K)) return SolveStatus::NotPositiveDefinite;
     const std::vector<SparseMatrix> ordered = impl.prepare(domains);
     Stopwatch analysis;
+    impl.nonzeros.clear();
+    for (const DomainMatrix& domain : domains) impl.nonzeros.push_back(domain.K.nonZeros());
     SolveStatus status = impl.analyze(ordered);
     impl.report.analyze_ms = analysis.elapsed_ms();
     if (status == SolveStatus::Ok) status = impl.factorize(ordered);
@@ -354,10 +408,13 @@ SolveStatus PrimalDual::solve(RightHandSides& b) {
   PIECEWORK_ASSERT(b.rows() == impl.dofs.num_rows);
   impl.times = {};
   try {
+    const bool estimate = std::isfinite(impl.options.refine_tolerance);
     impl.result = b;
+    fold(impl.dofs.seams, impl.result);
+    if (!impl.dofs.seams.empty() && estimate) impl.folded = impl.result;
     SolveStatus status = impl.apply(impl.result);
-    if (status == SolveStatus::Ok && std::isfinite(impl.options.refine_tolerance))
-      status = impl.refine(b, impl.result);
+    if (status == SolveStatus::Ok && estimate)
+      status = impl.refine(impl.dofs.seams.empty() ? b : impl.folded, impl.result);
     if (status == SolveStatus::Ok) b = impl.result;
     return status;
   } catch (const std::bad_alloc&) {

@@ -1,8 +1,8 @@
 #pragma once
 
 // The paper's exact global solve: one factor per domain, multipliers at vertices of two domains,
-// global unknowns at corners [Lu25, Sec. 4.2, Eqs. 4-10], corrected (docs/architecture.md,
-// D11-D15).
+// global unknowns at corners [Lu25, Sec. 4.2, Eqs. 4-10; seams: Sec. 4.4, Eq. 11], corrected
+// (docs/architecture.md, D11-D15, D18).
 
 #include <limits>
 #include <memory>
@@ -34,7 +34,8 @@ struct PrimalDualOptions {
 /// What factor() or refactor() did.
 struct PrimalDualReport {
   int num_domains = 0;
-  int num_multipliers = 0;          ///< N_lambda
+  int num_multipliers = 0;          ///< N_lambda, those of seams included
+  int num_seam_multipliers = 0;     ///< slaves of seams that are no corners
   int num_corners = 0;              ///< N_C
   double analyze_ms = 0;            ///< orderings of the domains; 0 if the patterns were known
   double domains_ms = 0;            ///< factors of the domains and their blocks of G
@@ -69,7 +70,20 @@ struct PrimalDualTimes {
 ///     G_RR lambda = b_R* - G_RC x_C                                           [Eq. 9]
 ///     x_R^j = K_RR^j-1 (b_R^j - S_D^jT lambda - K_RC^j S_C^j x_C)
 ///
+/// With seams (InterfaceDofs::seams) x minimises x^T K x / 2 - b^T x under x_s = sum_k T_sk x_k for
+/// every slave s. Each slave that is no corner has one more multiplier, and [Lu25, Eq. 11],
+/// corrected, is the system above with another G_RC and with B_C^jT K^j B_C^j in place of K^j:
+///
+///     sum_j S_D^j x_R^j + E x~_C = 0,  x_C = B_C x~_C
+///     G~_RC = sum_j S_D^j K_RR^j-1 K_RC^j S_C^j B_C^j - E
+///     (G~_CC + G~_RC^T G_RR^-1 G~_RC) x~_C = b~_C* + G~_RC^T G_RR^-1 b_R*
+///     G_RR lambda = b_R* - G~_RC x~_C
+///
+/// As x = T x_f, b counts only through T^T b, whatever of it is on slaves: it is folded first,
+/// which moves to the carriers what acts on their slaves.
+///
 /// b is divided evenly between the two copies of a duplicate, and x there is the mean of both.
+/// With seams errors are those of T^T K T x_f = T^T b.
 /// Domains run in parallel, sums run in domain order: the same bits for every number of threads.
 /// Not thread-safe; one object per thread. Memory that cannot be had is OutOfMemory, never an
 /// exception.

@@ -10,8 +10,6 @@
 #include <piecework/model/assembly.hpp>
 #include <piecework/model/projection.hpp>
 
-#include "projections.hpp"
-
 namespace piecework::local {
 namespace {
 
@@ -230,10 +228,8 @@ Value GaussSeidel::Impl::project(const Node& n, const Value& value,
                                  const model::StepProblem& problem) const {
   Value y = Value::Zero();
   if (n.triangle >= 0) {
-    if (!model::closest_isometry(value, y))
-      y = model::closest_isometry_degenerate(
-          value, reference_isometry(model.stretch[static_cast<std::size_t>(n.triangle)],
-                                    *problem.previous, model.start));
+    model::project_stretch(model.stretch[static_cast<std::size_t>(n.triangle)], value,
+                           *problem.previous, model.start, y);
     return y;
   }
   const double length = value.col(0).norm();

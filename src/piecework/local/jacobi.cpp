@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include <piecework/core/parallel.hpp>
+#include <piecework/model/projection.hpp>
 
 #include "patch_kernels.hpp"
 #include "patches.hpp"
-#include "projections.hpp"
 
 namespace piecework::local {
 namespace {

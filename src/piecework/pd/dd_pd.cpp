@@ -8,6 +8,7 @@
 
 #include <piecework/core/clock.hpp>
 #include <piecework/core/error.hpp>
+#include <piecework/core/parallel.hpp>
 #include <piecework/model/assembly.hpp>
 
 namespace piecework::pd {
@@ -57,19 +58,25 @@ void remember(const model::StepReport& report, std::vector<double>& memory) {
 }  // namespace
 
 DdPd::DdPd(const model::ClothModel& model, const DdPdOptions& options,
-           std::unique_ptr<global::ExactSolver> solver)
+           std::unique_ptr<global::ExactSolver> solver, const decomposition::Decomposition* domains)
     : model_(model),
       options_(options),
       convergence_(model, options.gravity, options.stop),
       metric_(model, assemble_system(model, options.h), std::move(solver)),
       acceleration_(make_acceleration(options.acceleration)),
-      local_(model, options.h) {}
+      local_(model, options.h),
+      domains_(domains) {
+  PIECEWORK_ASSERT(!options.sweeps || domains);
+}
 
 std::string DdPd::description() const { return "DD-PD, " + metric_.solver().description(); }
 
 void DdPd::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;
   metric_.prepare(fixed);
+  if (options_.sweeps)
+    sweeps_ = std::make_unique<local::GaussSeidel>(model_, *domains_, fixed, options_.h,
+                                                   *options_.sweeps);
 }
 
 model::SetupReport DdPd::setup_report() const {
@@ -79,6 +86,7 @@ model::SetupReport DdPd::setup_report() const {
 
 void DdPd::evaluate(Point& point, const model::StepProblem& problem, model::StepReport& report) {
   const Stopwatch watch;
+  if (sweeps_) sweeps_->sweep(point.x, problem, report.iterations);
   const auto result = local_.evaluate(point.x, problem, gradient_);
   metric_.reduction().gather(gradient_, point.g);
   point.energy = result.energy;
@@ -118,27 +126,45 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
   if (at_once || later) refresh_normals(report);
 }
 
+bool DdPd::is_acceptable(double step, double slope) {
+  if (options_.sweeps && options_.sweeps->form == local::SweepForm::LiteralEq12)
+    return std::isfinite(trial_.energy);
+  const double rounding = kEnergyRounding * std::abs(now_.energy);
+  if (trial_.energy < now_.energy - rounding) without_progress_ = 0;
+  if (trial_.energy <= now_.energy + kArmijo * step * slope) return true;
+  // Where energies differ by rounding only, the slopes still tell.
+  return trial_.energy <= now_.energy + rounding &&
+         std::abs(dot(trial_.g, d_)) <= (1 - 2 * kArmijo) * -slope;
+}
+
+void DdPd::accept(double step, model::StepReport& report) {
+  if (sweeps_) {
+    const model::Reduction& reduction = metric_.reduction();
+    moved_.resize(d_.rows(), 3);
+    parallel_for(static_cast<std::size_t>(d_.rows()), [&](std::size_t i) {
+      const int v = reduction.vertex(static_cast<int>(i));
+      moved_.row(static_cast<Eigen::Index>(i)) = trial_.x.row(v) - now_.x.row(v);
+    });
+  }
+  const Positions& moved = sweeps_ ? moved_ : d_;
+  const double scale = sweeps_ ? 1.0 : step;
+  acceleration_->accept(scale, moved, now_.g, trial_.g);
+  convergence_.measure_increment(moved, scale, report);
+  std::swap(now_, trial_);
+}
+
 bool DdPd::line_search(const model::StepProblem& problem, double slope, model::StepReport& report) {
   const bool may_shorten = acceleration_->scalable() || acceleration_->fresh();
   double step = 1;
   for (int k = 0; k < (may_shorten ? kMaxBacktracks : 1); ++k) {
     metric_.reduction().advance(now_.x, step, d_, trial_.x);
     evaluate(trial_, problem, report);
-    const double trial_slope = dot(trial_.g, d_);
-    const bool lower = trial_.energy <= now_.energy + kArmijo * step * slope;
-    // Where energies differ by rounding only, the slopes still tell.
-    const double rounding = kEnergyRounding * std::abs(now_.energy);
-    const bool equal = trial_.energy <= now_.energy + rounding &&
-                       std::abs(trial_slope) <= (1 - 2 * kArmijo) * -slope;
-    if (lower || equal) {
-      if (trial_.energy < now_.energy - rounding) without_progress_ = 0;
-      acceleration_->accept(step, d_, now_.g, trial_.g);
-      convergence_.measure_increment(d_, step, report);
-      std::swap(now_, trial_);
+    if (is_acceptable(step, slope)) {
+      accept(step, report);
       return true;
     }
     // The minimum of the parabola through both slopes, kept within reason.
-    const double wanted = step * slope / (slope - trial_slope);
+    const double wanted = step * slope / (slope - dot(trial_.g, d_));
     step = std::isfinite(wanted) ? std::clamp(wanted, 0.1 * step, 0.5 * step) : 0.1 * step;
   }
   return false;

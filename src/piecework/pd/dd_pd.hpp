@@ -4,8 +4,10 @@
 // (docs/convergence.md).
 
 #include <memory>
+#include <optional>
 #include <string>
 
+#include <piecework/local/gauss_seidel.hpp>
 #include <piecework/local/jacobi.hpp>
 #include <piecework/model/convergence.hpp>
 #include <piecework/model/stepper.hpp>
@@ -29,6 +31,10 @@ struct DdPdOptions {
   model::StopOptions stop;
   AccelerationOptions acceleration;
   NormalPart normals = NormalPart::Automatic;
+  /// Sweeps over the constraints of each domain before they are projected together [Lu25, Sec. 5];
+  /// absent: constraint-parallel projections only. SweepForm::LiteralEq12 may raise E and is taken
+  /// as it is, so it goes with AccelerationKind::None.
+  std::optional<local::SweepOptions> sweeps;
 };
 
 /// Minimises the incremental potential E [Lu25, Eq. 1]: accelerated local-global iterations in
@@ -36,9 +42,11 @@ struct DdPdOptions {
 /// and the extrapolation of the last two steps; E never rises.
 class DdPd final : public model::Minimizer {
  public:
-  /// \param model   must outlive this object  \param solver  of the global step
+  /// \param model    must outlive this object  \param solver  of the global step
+  /// \param domains  of the model, outlives this object; needed for sweeps only
   DdPd(const model::ClothModel& model, const DdPdOptions& options,
-       std::unique_ptr<global::ExactSolver> solver);
+       std::unique_ptr<global::ExactSolver> solver,
+       const decomposition::Decomposition* domains = nullptr);
 
   void prepare(const std::vector<char>& fixed) override;
   [[nodiscard]] model::SetupReport setup_report() const override;
@@ -55,10 +63,14 @@ class DdPd final : public model::Minimizer {
     int degenerate = 0;
   };
 
+  /// Sweeps x first, if that is wanted.
   void evaluate(Point& point, const model::StepProblem& problem, model::StepReport& report);
   void choose_start(const model::StepProblem& problem, const Positions& predicted,
                     model::StepReport& report);
   bool move(const model::StepProblem& problem, model::StepReport& report);
+  [[nodiscard]] bool is_acceptable(double step, double slope);
+  /// now_ <- trial_ = now_ + step d_.
+  void accept(double step, model::StepReport& report);
   bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
@@ -70,6 +82,9 @@ class DdPd final : public model::Minimizer {
   Metric metric_;
   std::unique_ptr<Acceleration> acceleration_;
   local::JacobiStep local_;
+  const decomposition::Decomposition* domains_;
+  std::unique_ptr<local::GaussSeidel> sweeps_;
+  Positions moved_;           ///< n_f x 3: displacement with the sweep
   int last_refresh_ = 0;      ///< iteration of the step
   int without_progress_ = 0;  ///< iterations
   Point now_, trial_;

@@ -1,5 +1,6 @@
 #include <piecework/runner/methods.hpp>
 
+#include <optional>
 #include <utility>
 
 #include <piecework/baselines/newton.hpp>
@@ -84,6 +85,12 @@ std::unique_ptr<model::Minimizer> make_xpbd(const MethodContext& context) {
                                            context.gravity, context.stop);
 }
 
+std::optional<local::SweepOptions> sweeps(const scene::Solver& solver) {
+  if (solver.local == "jacobi") return std::nullopt;
+  return local::SweepOptions{.form = solver.local == "literal_eq12" ? local::SweepForm::LiteralEq12
+                                                                    : local::SweepForm::Corrected};
+}
+
 std::unique_ptr<model::Minimizer> make_dd_pd(const MethodContext& context) {
   const scene::Scene& scene = context.world.scene;
   return std::make_unique<pd::DdPd>(
@@ -93,8 +100,9 @@ std::unique_ptr<model::Minimizer> make_dd_pd(const MethodContext& context) {
                       .stop = context.stop,
                       .acceleration = acceleration(scene.quality),
                       .normals = scene.quality.accelerate == "lbfgs_kn" ? pd::NormalPart::Automatic
-                                                                        : pd::NormalPart::Never},
-      make_exact_solver(context.world));
+                                                                        : pd::NormalPart::Never,
+                      .sweeps = sweeps(scene.solver)},
+      make_exact_solver(context.world), &context.world.domains);
 }
 
 }  // namespace
@@ -104,6 +112,7 @@ std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
   if (solver.global == "single") return global::make_cholmod_solver();
   if (solver.global == "primal_dual") {
     pd::PrimalDualStepOptions options{.corner_fraction = solver.corner_fraction};
+    options.seams = solver.seams == "dual" ? pd::SeamForm::Dual : pd::SeamForm::Elimination;
     options.solver.interface = solver.interface == "dense"    ? global::InterfaceKind::Dense
                                : solver.interface == "sparse" ? global::InterfaceKind::Sparse
                                                               : global::InterfaceKind::Recursive;

@@ -217,6 +217,33 @@ TEST(SewingScene, ClosesWhileARunIsInterruptedAndResumed) {
             std::string::npos);
 }
 
+// Multipliers on seams change how a step is solved, not what it gives.
+TEST(SewingScene, MultipliersMoveItAsEliminationDoes) {
+  const auto last = [](const char* form, const std::string& seams, double gap,
+                       std::vector<scene::Override> overrides) {
+    const TemporaryFolder folder;
+    overrides.insert(overrides.end(), {{"solver.global", "primal_dual"}, {"solver.seams", form}});
+    Watcher watcher;
+    run(two_panels(seams, gap, overrides), {.directory = folder.path()}, watcher);
+    return watcher.x;
+  };
+  const auto expect_same = [&](const std::string& seams, double gap,
+                               const std::vector<scene::Override>& overrides) {
+    const Positions elimination = last("elimination", seams, gap, overrides);
+    const Positions dual = last("dual", seams, gap, overrides);
+    ASSERT_EQ(dual.rows(), 56);
+    EXPECT_GT((dual - build_world(two_panels(seams, gap))->model.start).norm(), 0.1) << "it moves";
+    EXPECT_LT((dual - elimination).cwiseAbs().maxCoeff(), 1e-9);
+  };
+  expect_same(by_set(), 0, {});
+  expect_same(by_set(), 0, {{"solver.domains", "1"}, {"materials.m.bending", "1e-3"}});
+  expect_same(by_set(), 0, {{"solver.domains", "12"}, {"solver.corner_fraction", "0"}});
+  expect_same(by_set(R"(, "close_time": 0.08)"), 0.3, {});
+  // A pin on a slave, let go in the middle: other slaves and unknowns from then on.
+  expect_same(by_set(), 0,
+              {{"cloths.1.pins", R"([{"region": {"vertices": [4]}, "release": 0.06}])"}});
+}
+
 TEST(SewingScene, ReactionOfPinsCarriesBothPanels) {
   const TemporaryFolder folder;
   // Held along the seam, both panels at rest in the end: the pins carry their weight.

@@ -1,4 +1,3 @@
-#include <piecework/runner/methods.hpp>
 #include <piecework/runner/world.hpp>
 
 #include <set>
@@ -29,25 +28,6 @@ TEST(World, BuildsWhatTheSceneSays) {
   ASSERT_TRUE(world->forces.wind.has_value());
   ASSERT_TRUE(world->forces.gravity.has_value());
   EXPECT_EQ(world->forces.gravity->y(), -9.81);
-}
-
-TEST(World, MethodsAreMadeAsTheSceneNamesThem) {
-  const auto method = [](const std::vector<scene::Override>& overrides) {
-    const auto world = build_world(small_scene(overrides));
-    const auto integrator = make_integrator(*world);
-    model::State state = integrator->initial_state(world->part_velocity);
-    EXPECT_EQ(integrator->step(state).iterations, 6);
-    return integrator->minimizer().description();
-  };
-  EXPECT_TRUE(method({}).starts_with("vanilla PD"));
-  EXPECT_TRUE(method({{"solver.method", "newton"}}).starts_with("projected Newton, CHOLMOD"));
-  EXPECT_TRUE(method({{"solver.method", "newton"},
-                      {"solver.hessian", "unprojected"},
-                      {"solver.linear", "pcg"}})
-                  .starts_with("unprojected Newton, PCG"));
-  EXPECT_TRUE(method({{"solver.method", "pd_jacobi"}, {"solver.chebyshev_rho", "0.75"}})
-                  .ends_with("rho = 0.75"));
-  EXPECT_TRUE(method({{"solver.method", "xpbd"}}).starts_with("XPBD"));
 }
 
 TEST(World, WhatTheSceneDoesNotNameIsOff) {

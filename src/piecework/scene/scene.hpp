@@ -136,6 +136,7 @@ struct Solver {
   std::vector<double> domain_weights;  ///< per domain; empty: equal
   double corner_fraction = 0.5;
   std::string interface = "recursive";
+  std::string seams = "elimination";
   int threads = 0;  ///< 0: what the machine allows
   std::string hessian = "projected";
   std::string linear = "cholmod";

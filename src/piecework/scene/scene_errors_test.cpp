@@ -152,9 +152,9 @@ TEST(SceneErrors, Keys) {
           {with(R"(@"domains": 4)"),
            "/domains: unknown key \"domains\"; did you mean "
            "\"solver.domains\"?"},
-          {with(R"("solver": { @"sets": 4 })"),
-           "/solver/sets: unknown key \"sets\"; did you mean "
-           "\"cloths.0.pins.0.region.sets\"?"},
+          {with(R"("solver": { @"sphere": 4 })"),
+           "/solver/sphere: unknown key \"sphere\"; did you mean "
+           "\"cloths.0.pins.0.region.sphere\"?"},
           {with(R"(@"friction": 0.4)"),
            "/friction: unknown key \"friction\"; known keys here: name, description, step, "
            "gravity, "
@@ -300,6 +300,15 @@ TEST(SceneErrors, ChoicesAndReferences) {
            {with(R"("solver": { "domains": 3, "domain_weights": @[1, 2] })"),
             "/solver/domain_weights: 2 weights for 3 domains; write one per domain, or [] for "
             "equal domains"},
+           {with(R"("solver": { "local": @"gauss_seidel", "method": "newton" })"),
+            "/solver/local: \"gauss_seidel\" is a part of \"method\": \"dd_pd\" only; write "
+            "\"jacobi\", or choose \"dd_pd\" for \"method\""},
+           {with(R"("solver": { "local": @"literal_eq12" })"),
+            "/solver/local: the printed Eq. 12 may raise the energy, which no acceleration can "
+            "take; set \"accelerate\": \"none\" in \"quality\", or choose \"gauss_seidel\""},
+           {with(R"("solver": { "seams": @"dual" })"),
+            "/solver/seams: multipliers on seams, but \"global\" is \"tree\"; write "
+            "\"elimination\", or choose \"primal_dual\" for \"global\""},
            {with(R"("solver": { "domain_weights": @[1] })"),
             "/solver/domain_weights: 1 weights for 32 domains; write one per domain, or [] for "
             "equal domains"},

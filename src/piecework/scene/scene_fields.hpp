@@ -387,8 +387,15 @@ void fields(V& v, Solver& s) {
             {"single",
              "one sparse Cholesky factor of the whole system (CHOLMOD), on one thread: the "
              "baseline"}});
-  v.choice({"local", "local step"}, s.local,
-           {{"jacobi", "all constraints projected at the same positions, in parallel"}});
+  v.choice(
+      {"local", "local step"}, s.local,
+      {{"jacobi", "all constraints projected at the same positions, in parallel"},
+       {"gauss_seidel",
+        "`method: dd_pd`: before that, constraint after constraint inside each domain, domains in "
+        "parallel: the paper's local step, corrected. Fewer iterations, each dearer"},
+       {"literal_eq12",
+        "`method: dd_pd`, `accelerate: none`: the paper's Eq. 12 as printed. Biased: it does not "
+        "approach the result of the others. For comparison only"}});
   v.value({"domains", "domains to divide the cloths into (1: undivided)"}, s.domains,
           between(1, 65536));
   v.value({"domain_weights",
@@ -403,6 +410,12 @@ void fields(V& v, Solver& s) {
            {{"recursive", "sparse, by nested dissection, in parallel"},
             {"sparse", "sparse, by CHOLMOD on one thread"},
             {"dense", "dense, as the paper says; memory grows with vertices times domains"}});
+  v.choice(
+      {"seams", "how sewn vertices follow what carries them"}, s.seams,
+      {{"elimination", "they have no unknowns; what acts on them acts on what carries them"},
+       {"dual",
+        "with `global: primal_dual` only: they keep unknowns of their own, and multipliers hold "
+        "them in place, as the paper has it (corrected)"}});
   v.value({"threads", "worker threads; 0: what affinity and cgroup quota allow"}, s.threads,
           between(0, 1024));
 }

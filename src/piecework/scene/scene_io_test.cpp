@@ -29,7 +29,8 @@ constexpr const char* kEveryKey = R"({
   "wind": { "velocity": [4, 5, 6], "air_density": 1.1, "normal_drag": 2, "tangential_drag": 0.5,
             "gust_amplitude": 0.25, "gust_period": 3 },
   "damping": 0.125,
-  "solver": { "method": "vanilla_pd", "global": "single", "local": "jacobi", "domains": 5,
+  "solver": { "method": "vanilla_pd", "global": "primal_dual", "local": "jacobi", "domains": 5,
+              "corner_fraction": 0.25, "interface": "dense", "seams": "dual",
               "domain_weights": [1, 1, 1, 0.5, 0.25],
               "threads": 3, "hessian": "unprojected", "linear": "pcg", "chebyshev_rho": 0.75 },
   "quality": { "stop": "dx_rms", "tolerance": 1e-3, "max_iterations": 11, "min_iterations": 2,
@@ -116,8 +117,9 @@ Scene expected_every_key() {
   scene.gravity = {1, 2, 3};
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;
-  scene.solver = {"vanilla_pd",  "single", "jacobi", 5, {1, 1, 1, 0.5, 0.25}, 0.5, "recursive", 3,
-                  "unprojected", "pcg",    0.75};
+  scene.solver = {"vanilla_pd", "primal_dual", "jacobi", 5, {1, 1, 1, 0.5, 0.25},
+                  0.25,         "dense",       "dual",   3, "unprojected",
+                  "pcg",        0.75};
   scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single", "reference"};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();

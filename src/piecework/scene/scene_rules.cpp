@@ -149,6 +149,22 @@ void check_domain_weights(const Solver& solver, const Part& part) {
                "write one per domain, or [] for equal domains");
 }
 
+void check_seam_form(const Solver& solver, const Part& part) {
+  part.require(solver.seams != "dual" || solver.global == "primal_dual",
+               fmt::format("multipliers on seams, but \"global\" is \"{}\"", solver.global),
+               "write \"elimination\", or choose \"primal_dual\" for \"global\"");
+}
+
+void check_local_step(const Scene& scene, const Part& part) {
+  const std::string& local = scene.solver.local;
+  part.require(local == "jacobi" || scene.solver.method == "dd_pd",
+               fmt::format("\"{}\" is a part of \"method\": \"dd_pd\" only", local),
+               "write \"jacobi\", or choose \"dd_pd\" for \"method\"");
+  part.require(local != "literal_eq12" || scene.quality.accelerate == "none",
+               "the printed Eq. 12 may raise the energy, which no acceleration can take",
+               "set \"accelerate\": \"none\" in \"quality\", or choose \"gauss_seidel\"");
+}
+
 /// A misspelt override must not pass as the definition of a new material.
 void check_overridden_materials(const Scene& scene, const Document& document, const Part& part) {
   std::vector<std::string> used;
@@ -169,6 +185,8 @@ void check_rules(const Scene& scene, const Document& document) {
   check_order(root.in("quality").in("max_iterations"), scene.quality.min_iterations,
               scene.quality.max_iterations, "min_iterations", "max_iterations");
   check_domain_weights(scene.solver, root.in("solver").in("domain_weights"));
+  check_seam_form(scene.solver, root.in("solver").in("seams"));
+  check_local_step(scene, root.in("solver").in("local"));
   root.in("step")
       .in("output_every")
       .require(

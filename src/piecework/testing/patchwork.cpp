@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include <Eigen/LU>
+
 #include <piecework/testing/small_cloths.hpp>
 
 namespace piecework::testing {
@@ -77,6 +79,31 @@ Eigen::MatrixXd constraint_rows(const std::vector<mesh::Stitch>& stitches, int n
     C(row, stitches[i].b) -= stitches[i].ratio;
   }
   return C;
+}
+
+Eigen::MatrixXd constraint_rows(const mesh::SeamMap& seams) {
+  Eigen::MatrixXd C =
+      Eigen::MatrixXd::Zero(seams.num_slaves(), static_cast<Eigen::Index>(seams.row.size()));
+  for (int s = 0; s < seams.num_slaves(); ++s) {
+    const int slave = seams.slaves[static_cast<std::size_t>(s)];
+    C(s, slave) += 1;
+    seams.visit_carriers(slave, [&](int carrier, double weight) { C(s, carrier) -= weight; });
+  }
+  return C;
+}
+
+Eigen::MatrixXd solve_with_multipliers(const Eigen::MatrixXd& K, const Eigen::MatrixXd& b,
+                                       const Eigen::MatrixXd& C) {
+  const Eigen::Index n = K.rows();
+  const Eigen::Index rows = C.rows();
+  const double scale = K.diagonal().mean();
+  Eigen::MatrixXd saddle = Eigen::MatrixXd::Zero(n + rows, n + rows);
+  saddle.topLeftCorner(n, n) = K;
+  saddle.bottomLeftCorner(rows, n) = scale * C;
+  saddle.topRightCorner(n, rows) = scale * C.transpose();
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(n + rows, b.cols());
+  right.topRows(n) = b;
+  return saddle.partialPivLu().solve(right).topRows(n);
 }
 
 mesh::SeamNames plain_names() {

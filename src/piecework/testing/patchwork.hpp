@@ -30,6 +30,15 @@ std::vector<mesh::Stitch> geometric_stitches(const std::vector<Patch>& patches);
 /// Rows e_v - (1 - r) e_a - r e_b, one per stitch: C x = 0 says what stitches say.
 Eigen::MatrixXd constraint_rows(const std::vector<mesh::Stitch>& stitches, int num_vertices);
 
+/// Rows e_s - sum_k T_sk e_k, one per slave: the same of resolved seams.
+Eigen::MatrixXd constraint_rows(const mesh::SeamMap& seams);
+
+/// argmin x^T K x / 2 - b^T x under C x = 0, by one dense solve with multipliers: shares nothing
+/// with the elimination or with domains.
+/// \pre the rows of C are independent.
+Eigen::MatrixXd solve_with_multipliers(const Eigen::MatrixXd& K, const Eigen::MatrixXd& b,
+                                       const Eigen::MatrixXd& C);
+
 /// For messages in tests: "seam 0", "vertex 7".
 mesh::SeamNames plain_names();
 
