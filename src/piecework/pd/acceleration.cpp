@@ -5,6 +5,7 @@
 #include <deque>
 #include <utility>
 
+#include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
@@ -128,6 +129,20 @@ double dot(const Positions& a, const Positions& b) {
                                                    std::min(size, (block + 1) * kBlock));
                               },
                               1);
+}
+
+std::string to_string(const AccelerationOptions& options) {
+  switch (options.kind) {
+    case AccelerationKind::None:
+      return "not accelerated";
+    case AccelerationKind::Chebyshev:
+      return fmt::format("Chebyshev, rho {:g}", options.rho);
+    case AccelerationKind::Anderson:
+      return fmt::format("Anderson of {} iterates", options.window);
+    case AccelerationKind::Lbfgs:
+      return fmt::format("L-BFGS of {} pairs", options.window);
+  }
+  return "";
 }
 
 std::unique_ptr<Acceleration> make_acceleration(const AccelerationOptions& options) {

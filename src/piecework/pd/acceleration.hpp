@@ -4,6 +4,7 @@
 // metric P only: with P = K~^-1 and no acceleration this is projective dynamics itself.
 
 #include <memory>
+#include <string>
 
 #include <piecework/core/types.hpp>
 #include <piecework/pd/metric.hpp>
@@ -22,6 +23,9 @@ struct AccelerationOptions {
   int window = 5;     ///< remembered iterates m (Anderson, L-BFGS)
   double rho = 0.99;  ///< estimated spectral radius (Chebyshev)
 };
+
+/// "L-BFGS of 5 pairs".
+std::string to_string(const AccelerationOptions& options);
 
 /// Vectors are n_f x 3, row-major; g in N, displacements in m.
 class Acceleration {

@@ -69,7 +69,15 @@ DdPd::DdPd(const model::ClothModel& model, const DdPdOptions& options,
   PIECEWORK_ASSERT(!options.sweeps || domains);
 }
 
-std::string DdPd::description() const { return "DD-PD, " + metric_.solver().description(); }
+std::string DdPd::description() const {
+  std::string text = "DD-PD";
+  if (options_.sweeps)
+    text += options_.sweeps->form == local::SweepForm::Corrected ? ", Gauss-Seidel sweeps"
+                                                                 : ", Eq. 12 as printed (biased)";
+  text += ", " + to_string(options_.acceleration);
+  if (options_.normals != NormalPart::Never) text += " in the metric K + N";
+  return text + ", " + metric_.solver().description();
+}
 
 void DdPd::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;

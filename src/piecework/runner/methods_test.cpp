@@ -90,8 +90,9 @@ TEST(Methods, SweepsKeepTheMinimumUnlessTakenLiterally) {
     model::StepProblem problem = cloth.problem();
     double last = std::numeric_limits<double>::infinity();
     problem.observer = [&](const model::StepReport& report, const Positions&) {
-      if (form != local::SweepForm::LiteralEq12)
+      if (form != local::SweepForm::LiteralEq12) {
         EXPECT_LE(report.energy, last * (1 + 1e-12)) << report.iterations;
+      }
       last = report.energy;
       return true;
     };
@@ -125,11 +126,12 @@ TEST(Methods, AreMadeAsTheSceneNamesThem) {
     EXPECT_EQ(integrator->step(state).iterations, 6);
     return integrator->minimizer().description();
   };
-  EXPECT_TRUE(method({}).starts_with("DD-PD, tree, 32-bit factor"));
   EXPECT_TRUE(
-      method({{"solver.local", "gauss_seidel"}}).starts_with("DD-PD, Gauss-Seidel sweeps, tree"));
+      method({}).starts_with("DD-PD, L-BFGS of 5 pairs in the metric K + N, tree, 32-bit factor"));
+  EXPECT_TRUE(
+      method({{"solver.local", "gauss_seidel"}}).starts_with("DD-PD, Gauss-Seidel sweeps, L-BFGS"));
   EXPECT_TRUE(method({{"solver.local", "literal_eq12"}, {"quality.accelerate", "none"}})
-                  .starts_with("DD-PD, Eq. 12 as printed (biased)"));
+                  .starts_with("DD-PD, Eq. 12 as printed (biased), not accelerated, tree"));
   EXPECT_TRUE(method({{"solver.method", "vanilla_pd"}}).starts_with("vanilla PD"));
   EXPECT_TRUE(method({{"solver.method", "newton"}}).starts_with("projected Newton, CHOLMOD"));
   EXPECT_TRUE(method({{"solver.method", "newton"},
