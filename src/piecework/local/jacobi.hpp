@@ -19,8 +19,8 @@ namespace piecework::local {
 /// order: the result has the same bits for every number of threads (per build and instruction set).
 /// Element differences are taken before products, so it keeps its accuracy far from the origin.
 /// The energy is a sum of squares, one per constraint: that of a nearly flat sheet is as accurate
-/// as its curvature. (Flat hinges as one constant matrix Q would move fewer bytes, but x.Qx cancels
-/// where a sheet is nearly flat, and the energy of each hinge takes most of the work again.)
+/// as its curvature. (Flat hinges as one constant matrix Q take as long, and x.Qx cancels: see
+/// docs/architecture.md.)
 class JacobiStep {
  public:
   struct Result {
