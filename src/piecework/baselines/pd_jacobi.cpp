@@ -57,7 +57,9 @@ PdJacobi::PdJacobi(const model::ClothModel& model, double h, double gravity,
       inverse_h_sq_(1.0 / (h * h)),
       K_(assemble_system(model, h)),
       rounding_(model),
-      local_(model, h) {}
+      local_(model, h) {
+  convergence_.assume_stiffness_ratio(stiffness_ratio(model, K_, h));
+}
 
 std::string PdJacobi::description() const {
   return options_.rho

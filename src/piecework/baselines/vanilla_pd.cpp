@@ -18,7 +18,9 @@ VanillaPd::VanillaPd(const model::ClothModel& model, double h, double gravity,
       convergence_(model, gravity, stop),
       K_(assemble_system(model, h)),
       solver_(std::move(solver)),
-      local_(model, h) {}
+      local_(model, h) {
+  convergence_.assume_stiffness_ratio(stiffness_ratio(model, K_, h));
+}
 
 std::string VanillaPd::description() const {
   return "vanilla PD, Jacobi local step, " + solver_->description();

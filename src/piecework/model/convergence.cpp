@@ -28,12 +28,13 @@ double ErrorEstimate::rate() const {
   return std::min(0.999, std::pow(increments_.back() / increments_.front(), 1 / span));
 }
 
-double ErrorEstimate::value() const {
+double ErrorEstimate::value(double least) const {
   if (!increments_.empty() && increments_.back() == 0) return 0;  // nothing is left to do
   if (increments_.size() < 2) return std::numeric_limits<double>::infinity();
   const auto recent = increments_.end() - std::min<std::ptrdiff_t>(3, std::ssize(increments_));
   const double q = rate();
-  return 2 * std::max(1.0, q / (1 - q)) * *std::max_element(recent, increments_.end());
+  const double factor = std::max(2 * std::max(1.0, q / (1 - q)), least);
+  return factor * *std::max_element(recent, increments_.end());
 }
 
 Convergence::Convergence(const ClothModel& model, double gravity, StopOptions stop)
@@ -50,7 +51,7 @@ void Convergence::measure_increment(std::size_t count, const RowSquare& row_sq,
   report.dx_rms = count > 0 ? std::sqrt(sum_sq / static_cast<double>(count)) / unit_box_ : 0;
   report.dx_inf = std::sqrt(parallel_max(count, row_sq)) / unit_box_;
   error_.add(report.dx_inf);
-  report.error = error_.value() * unit_box_ / mean_edge_;
+  report.error = error_.value(hidden_) * unit_box_ / mean_edge_;
 }
 
 void Convergence::measure_increment(const Unknowns& dx, StepReport& report) {
@@ -119,6 +120,16 @@ double Convergence::expected_iterations(const StepReport& report) const {
   if (stop_.rule == StopRule::Iterations) return left;
   const double decay = -std::log(error_.rate());
   return std::min(left, std::max(0.0, std::log(measure(report) / stop_.tolerance) / decay));
+}
+
+double stiffness_ratio(const ClothModel& model, const SparseMatrix& K, double h) {
+  const auto count = static_cast<std::size_t>(model.num_vertices());
+  const Eigen::VectorXd diagonal = K.diagonal();
+  const double sum = parallel_sum<double>(count, [&](std::size_t v) {
+    const auto row = static_cast<Eigen::Index>(v);
+    return diagonal[row] * h * h / model.mass[row];
+  });
+  return sum / static_cast<double>(count);
 }
 
 }  // namespace piecework::model

@@ -66,6 +66,7 @@ DdPd::DdPd(const model::ClothModel& model, const DdPdOptions& options,
       acceleration_(make_acceleration(options.acceleration)),
       local_(model, options.h),
       domains_(domains) {
+  stiffness_ratio_ = model::stiffness_ratio(model, metric_.K(), options.h);
   PIECEWORK_ASSERT(!options.sweeps || domains);
 }
 
@@ -115,7 +116,7 @@ void DdPd::choose_start(const model::StepProblem& problem, const Positions& pred
 
 void DdPd::refresh_normals(model::StepReport& report) {
   const Stopwatch watch;
-  metric_.refresh_normals(now_.x);
+  if (metric_.refresh_normals(now_.x)) convergence_.assume_stiffness_ratio(1);
   acceleration_->metric_changed();
   ++report.normal_factors;
   last_refresh_ = report.iterations;
@@ -209,6 +210,7 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   convergence_.begin();
   acceleration_->restart();
   metric_.drop_normals();
+  convergence_.assume_stiffness_ratio(stiffness_ratio_);
   choose_start(problem, x, report);
   convergence_.measure_gradient(now_.g, report);
   report.energy = now_.energy;

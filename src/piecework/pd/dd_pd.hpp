@@ -78,6 +78,7 @@ class DdPd final : public model::Minimizer {
   const model::ClothModel& model_;
   DdPdOptions options_;
   model::Convergence convergence_;
+  double stiffness_ratio_ = 1;
   std::vector<char> fixed_;
   Metric metric_;
   std::unique_ptr<Acceleration> acceleration_;

@@ -23,6 +23,8 @@ class Metric {
   /// \throws SimulationError if K~ is not positive definite or its factor does not fit into memory.
   void prepare(const std::vector<char>& fixed);
 
+  /// As given to the constructor.
+  [[nodiscard]] const SparseMatrix& K() const { return K_; }
   [[nodiscard]] const model::Reduction& reduction() const { return reduction_; }
   [[nodiscard]] const global::ExactSolver& solver() const { return *solver_; }
 
