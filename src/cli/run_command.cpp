@@ -35,6 +35,7 @@ struct RunArguments {
   std::vector<std::string> set;
   bool no_images = false;
   bool no_state = false;
+  bool log_iterations = false;
   bool fast_images = false;
   std::vector<std::string> exports;
   int checkpoint_every = 0;
@@ -166,6 +167,7 @@ int run(const RunArguments& arguments, const Verbosity& verbosity) {
   options.checkpoint_every = arguments.checkpoint_every;
   options.resume = arguments.resume;
   options.overwrite = arguments.overwrite;
+  options.log_iterations = arguments.log_iterations;
   options.save_states = !arguments.no_state || !arguments.no_images;
   for (const std::string& name : arguments.exports) options.exports.push_back(export_format(name));
   // Without OpenGL a run with pictures would fail only at its end: find out now.
@@ -203,6 +205,8 @@ void add_run(CLI::App& program, Action& action, const Verbosity& verbosity) {
                   "Override a scene key: key=value, e.g. solver.domains=16")
       ->allow_extra_args(false);
   app->add_flag("--no-images", arguments->no_images, "Draw nothing; needs no OpenGL");
+  app->add_flag("--log-iterations", arguments->log_iterations,
+                "Also write iterations.csv: energy, gradient, increments of every iteration");
   app->add_flag("--no-state", arguments->no_state,
                 "Keep no state/ files (`piecework render` needs them)");
   app->add_flag("--fast-images", arguments->fast_images, "No shadows, no ambient occlusion");

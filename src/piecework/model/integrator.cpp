@@ -89,8 +89,12 @@ StepReport Integrator::step(State& state) {
   std::vector<double> memory = state.memory;
   double misc = phase.lap();
 
-  const StepProblem problem{&predicted_, &fixed, &state.x, extrapolate ? &extrapolated_ : nullptr,
-                            &memory,     {}};
+  StepProblem problem{&predicted_, &fixed, &state.x, extrapolate ? &extrapolated_ : nullptr,
+                      &memory,     {}};
+  if (iteration_observer_)
+    problem.observer = [&](const StepReport& report, const Positions& x) {
+      return iteration_observer_(state.step + 1, report, x);
+    };
   if (observer_) observer_(problem);
   StepReport report = minimizer_->minimize(problem, x_);
 

@@ -42,6 +42,11 @@ class Integrator {
   /// velocity of each part.
   [[nodiscard]] State initial_state(const std::vector<Vec3>& part_velocity) const;
 
+  /// Called with the number of the step (from 1) and as StepProblem::observer.
+  void observe_iterations(std::function<bool(int, const StepReport&, const Positions&)> observer) {
+    iteration_observer_ = std::move(observer);
+  }
+
   /// Called with the problem of each step before it is solved: for studies.
   void observe(std::function<void(const StepProblem&)> observer) {
     observer_ = std::move(observer);
@@ -62,6 +67,7 @@ class Integrator {
   IntegratorOptions options_;
   std::unique_ptr<Minimizer> minimizer_;
   std::function<void(const StepProblem&)> observer_;
+  std::function<bool(int, const StepReport&, const Positions&)> iteration_observer_;
   Positions acceleration_, predicted_, extrapolated_, x_;
 };
 

@@ -17,6 +17,7 @@
 #include <piecework/runner/checkpoint.hpp>
 #include <piecework/runner/environment.hpp>
 #include <piecework/runner/expectation.hpp>
+#include <piecework/runner/iteration_log.hpp>
 #include <piecework/runner/methods.hpp>
 #include <piecework/scene/scene_io.hpp>
 
@@ -43,7 +44,8 @@ bool is_frame_file(const std::string& name) {
 
 bool is_run_file(const std::string& name) {
   return is_frame_file(name) || name == kResolvedScene || name == kRecord || name == kCheckpoint ||
-         name == "timings.csv" || name == "summary.md" || name == "contact_sheet.png";
+         name == IterationLog::kFile || name == "timings.csv" || name == "summary.md" ||
+         name == "contact_sheet.png";
 }
 
 /// Removes what an earlier run wrote, and nothing else.
@@ -105,6 +107,8 @@ class Run {
     prepare_directory();
     integrator_ = make_integrator(*world_);
     load_or_start();
+    if (options_.log_iterations)
+      iterations_.emplace(options_.directory, state_.step).attach(*integrator_);
     integrator_->prepare(state_);
     record_.method = integrator_->minimizer().description();
     record_.setup = integrator_->minimizer().setup_report();
@@ -261,6 +265,7 @@ class Run {
     write_file_atomically(options_.directory / kRecord, to_json(record_, *world_));
     write_file_atomically(options_.directory / "timings.csv", to_csv(record_));
     write_file_atomically(options_.directory / "summary.md", to_markdown(record_, *world_));
+    if (iterations_) iterations_->save();
   }
 
   /// The record first, so that a checkpoint never knows more frames than the record.
@@ -276,6 +281,7 @@ class Run {
   CpuTime cpu_before_;
   std::unique_ptr<World> world_;
   ExpectationChecker expectations_;
+  std::optional<IterationLog> iterations_;
   std::unique_ptr<model::Integrator> integrator_;
   RunRecord record_;
   model::State state_;

@@ -16,12 +16,13 @@ namespace piecework::runner {
 
 struct RunOptions {
   std::filesystem::path directory;
-  int frames = -1;           ///< frames to simulate; -1: as the scene says
-  int threads = 0;           ///< 0: as the scene says, else what the machine allows
-  int checkpoint_every = 0;  ///< frames between checkpoints; 0: at the end only
-  bool resume = false;       ///< insist on a checkpoint's existence being looked for and said
-  bool overwrite = false;    ///< drop what an earlier run left in the directory
-  bool save_states = true;   ///< state/frame_*.bin, which `piecework render` reads
+  int frames = -1;              ///< frames to simulate; -1: as the scene says
+  int threads = 0;              ///< 0: as the scene says, else what the machine allows
+  int checkpoint_every = 0;     ///< frames between checkpoints; 0: at the end only
+  bool resume = false;          ///< insist on a checkpoint's existence being looked for and said
+  bool overwrite = false;       ///< drop what an earlier run left in the directory
+  bool log_iterations = false;  ///< iterations.csv, see IterationLog
+  bool save_states = true;      ///< state/frame_*.bin, which `piecework render` reads
   std::vector<mesh::ExportFormat> exports;
   std::vector<std::pair<std::string, std::string>> overrides;  ///< recorded
 };

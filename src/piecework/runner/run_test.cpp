@@ -1,5 +1,8 @@
 #include <piecework/runner/run.hpp>
 
+#include <sstream>
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -99,6 +102,41 @@ TEST(Run, ContinuedRunHasTheSameBits) {
     EXPECT_EQ(read_file(whole.path() / "state" / (frame_name(frame) + ".bin")),
               read_file(broken.path() / "state" / (frame_name(frame) + ".bin")))
         << frame;
+}
+
+// What the log says of a step must be what the record says, and a continued log must be the whole.
+TEST(Run, LogsEveryIterationIfAsked) {
+  const TemporaryFolder whole;
+  Watcher watcher;
+  const RunOutcome outcome = simulate(whole.path(), watcher, {.log_iterations = true});
+  const std::string text = read_file(whole.path() / "iterations.csv");
+  std::istringstream lines(text);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_TRUE(line.starts_with("step,iteration,energy_j,"));
+  int count = 0;
+  std::string last;
+  while (std::getline(lines, line)) {
+    ++count;
+    last = line;
+  }
+  // One line for the start of each step, one per iteration.
+  EXPECT_EQ(count, totals(outcome.record.frames).iterations + totals(outcome.record.frames).steps);
+  const FrameRecord& frame = outcome.record.frames.back();
+  EXPECT_TRUE(last.starts_with(
+      fmt::format("{},{},{:.9g},", frame.step, frame.iterations / frame.steps, frame.energy)))
+      << last;
+
+  const TemporaryFolder halves;
+  Watcher stops(3);
+  (void)simulate(halves.path(), stops, {.log_iterations = true});
+  Watcher goes_on;
+  (void)simulate(halves.path(), goes_on, {.log_iterations = true});
+  EXPECT_EQ(read_file(halves.path() / "iterations.csv"), text);
+
+  const TemporaryFolder unasked;
+  (void)simulate(unasked.path(), watcher);
+  EXPECT_FALSE(fs::exists(unasked.path() / "iterations.csv"));
 }
 
 TEST(Run, CompleteRunIsLeftAlone) {
