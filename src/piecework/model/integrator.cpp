@@ -89,8 +89,8 @@ StepReport Integrator::step(State& state) {
   std::vector<double> memory = state.memory;
   double misc = phase.lap();
 
-  const StepProblem problem{&predicted_, &fixed, &state.x,
-                            extrapolate ? &extrapolated_ : nullptr, &memory, {}};
+  const StepProblem problem{&predicted_, &fixed, &state.x, extrapolate ? &extrapolated_ : nullptr,
+                            &memory,     {}};
   if (observer_) observer_(problem);
   StepReport report = minimizer_->minimize(problem, x_);
 

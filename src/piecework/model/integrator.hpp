@@ -43,7 +43,9 @@ class Integrator {
   [[nodiscard]] State initial_state(const std::vector<Vec3>& part_velocity) const;
 
   /// Called with the problem of each step before it is solved: for studies.
-  void observe(std::function<void(const StepProblem&)> observer) { observer_ = std::move(observer); }
+  void observe(std::function<void(const StepProblem&)> observer) {
+    observer_ = std::move(observer);
+  }
 
   [[nodiscard]] const Minimizer& minimizer() const { return *minimizer_; }
 
