@@ -12,9 +12,8 @@ constexpr int kAllUpTo = 40;      // iterations: each is kept
 constexpr double kGrowth = 1.04;  // beyond: one in every 4 %
 
 int after(int iteration) {
-  return std::max(iteration + 1, iteration < kAllUpTo
-                                     ? 0
-                                     : static_cast<int>(std::lround(kGrowth * iteration)));
+  return std::max(iteration + 1,
+                  iteration < kAllUpTo ? 0 : static_cast<int>(std::lround(kGrowth * iteration)));
 }
 
 std::string number(double value) {

@@ -24,8 +24,8 @@ class Series {
 
  private:
   std::vector<TracePoint> points_;
-  int next_ = 0;                ///< the iteration to be kept next
-  bool last_may_go_ = false;    ///< the last point is there only because it is the last
+  int next_ = 0;              ///< the iteration to be kept next
+  bool last_may_go_ = false;  ///< the last point is there only because it is the last
 };
 
 /// A run with what tells it from others.
