@@ -190,14 +190,14 @@ def legend(methods, with_stop):
     return out
 
 
-def frame(heading, context, vertical_words, parts, note):
+def frame(heading, context, vertical_words, parts, below):
     """A whole figure around its panels."""
     middle = (TOP + HEIGHT - BOTTOM) / 2
     return document(WIDTH, HEIGHT, [
         text(LEFT, 30, heading, 18, "start", ' font-weight="bold"'),
         text(WIDTH - RIGHT, 30, origin(context), 11, "end", ' fill="#555"'), *parts,
         text(22, middle, vertical_words, 14, "middle", f' transform="rotate(-90 22 {middle:.1f})"'),
-        text(WIDTH - RIGHT, HEIGHT - 10, note, 11, "end", ' fill="#555"')])
+        text(WIDTH - RIGHT, HEIGHT - 10, below, 11, "end", ' fill="#555"')])
 
 
 def panel_edges(count):
@@ -225,16 +225,23 @@ def curves(traces, vertical, floor):
     return legend(methods, any(paper_stop(t) for t in traces)) + out
 
 
-def front(problem, traces, context):
+def note(words, rows):
+    """What stands below a figure; a warning where other work made times long."""
+    disturbed = sum(r.disturbed for r in rows)
+    return words + (f"; {disturbed} of {len(rows)} methods disturbed: times provisional"
+                    if disturbed else "")
+
+
+def front(rows, traces, context):
     """Energy error against time and iterations."""
-    _, cloth, n = problem
+    _, cloth, n = traces[0].problem
     parts = curves(traces, "energy_error", FLOOR)
     return parts and frame(f"Error of one step: {cloth}, {n} vertices", context,
                            "relative energy error", parts,
-                           "error against the exact minimum; runs end at 5·10⁻⁷ or after 20 s")
+                           note("error against the exact minimum; runs end at 5·10⁻⁷ or after 20 s", rows))
 
 
-def gradient_figure(traces, context):
+def gradient_figure(rows, traces, context):
     """Our analogue of the paper's Fig. 21, as deep as the methods get."""
     least = min((v for t in traces for _, v in drawable(t.points, "ms", "gradient") if v > 0),
                 default=None)
@@ -244,7 +251,8 @@ def gradient_figure(traces, context):
     return frame(f"Gradient of one step, h = 1/60 s: {cloth}, {n} vertices", context,
                  "gradient: rms residual / mean nodal weight",
                  curves(traces, "gradient", 0.7 * least),
-                 "our analogue of the paper's Fig. 21; runs end at a gradient of 10⁻⁵ or after 20 s")
+                 note("our analogue of the paper's Fig. 21; runs end at a gradient of 10⁻⁵ or after "
+                      "20 s", rows))
 
 
 def growth_points(rows, traces, method):
@@ -302,10 +310,11 @@ def figures(traces, rows, context):
     result = {}
     for problem, of_problem in groups(traces, lambda t: t.problem).items():
         family, cloth, n = problem
+        its_rows = [r for r in rows if r.ok and r.problem == problem]
         if family == "fig21":
-            result["fig21.svg"] = gradient_figure(of_problem, context)
+            result["fig21.svg"] = gradient_figure(its_rows, of_problem, context)
         else:
-            result[f"front_{cloth}_{n}.svg"] = front(problem, of_problem, context)
+            result[f"front_{cloth}_{n}.svg"] = front(its_rows, of_problem, context)
     ordinary = [r for r in rows if r.family == "convergence"]
     result["iterations_vs_n.svg"] = growth(
         ordinary, [t for t in traces if t.family == "convergence"], context)

@@ -168,6 +168,10 @@ class ConvergenceTables(unittest.TestCase):
         quiet = make(changed("vanilla_pd", spread=1.0))["convergence.md"]
         self.assertNotIn("rows are disturbed", quiet)
 
+    def test_disturbed_fronts_say_so(self):
+        self.assertIn("1 of 4 methods disturbed", self.files["front_cotton_100.svg"])
+        self.assertNotIn("disturbed", self.files["front_soft_100.svg"])
+
     def test_csv(self):
         text = self.files["convergence.csv"]
         self.assertEqual(text.count("\r\n"), text.count("\n"))
