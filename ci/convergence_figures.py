@@ -11,7 +11,8 @@ WIDTH, HEIGHT = 1200, 600
 LEFT, RIGHT, TOP, BOTTOM, GAP = 74, 24, 106, 72, 62  # margins around all panels, and between them
 SECOND_LINE = 74  # height of the legend
 
-# Hues that colour-blind people tell apart [Okabe, Ito]; ours is the widest line, Newton's are dashed.
+# Hues that colour-blind people tell apart [Okabe, Ito]; ours is the widest line, Newton's are
+# dashed.
 STYLES = {
     "default": ("default (L-BFGS, K⁻¹ + N Kn⁻¹ Nᵀ)", "#D55E00", ""),
     "lbfgs": ("L-BFGS, K⁻¹", "#E69F00", ""),
@@ -53,7 +54,8 @@ class LogAxis:
             return list(self.given)
         first, last = math.floor(math.log10(self.low)), math.ceil(math.log10(self.high))
         few = self.high < 2000 * self.low
-        values = [m * 10.0 ** e for e in range(first, last + 1) for m in ((1, 2, 5) if few else (1,))]
+        steps = (1, 2, 5) if few else (1,)
+        values = [m * 10.0 ** e for e in range(first, last + 1) for m in steps]
         return [v for v in values if 0.999 * self.low <= v <= 1.001 * self.high]
 
     def label(self, value):
@@ -143,7 +145,7 @@ def clipped(points, floor):
 
 
 def stairs(points):
-    """An error is reached when its iteration ends, not on the way: until then the last one holds."""
+    """An error is reached when its iteration ends; until then the last one holds."""
     result = points[:1]
     for (start, before), (x, y) in zip(points, points[1:]):
         result += [(x, before)] if x - start > SHORTEST_STAIR else []
@@ -236,9 +238,9 @@ def front(rows, traces, context):
     """Energy error against time and iterations."""
     _, cloth, n = traces[0].problem
     parts = curves(traces, "energy_error", FLOOR)
+    below = note("error against the exact minimum; runs end at 5·10⁻⁷ or after 20 s", rows)
     return parts and frame(f"Error of one step: {cloth}, {n} vertices", context,
-                           "relative energy error", parts,
-                           note("error against the exact minimum; runs end at 5·10⁻⁷ or after 20 s", rows))
+                           "relative energy error", parts, below)
 
 
 def gradient_figure(rows, traces, context):
@@ -248,11 +250,11 @@ def gradient_figure(rows, traces, context):
     if least is None:
         return None
     _, cloth, n = traces[0].problem
+    below = note("our analogue of the paper's Fig. 21; runs end at a gradient of 10⁻⁵ or after 20 s",
+                 rows)
     return frame(f"Gradient of one step, h = 1/60 s: {cloth}, {n} vertices", context,
                  "gradient: rms residual / mean nodal weight",
-                 curves(traces, "gradient", 0.7 * least),
-                 note("our analogue of the paper's Fig. 21; runs end at a gradient of 10⁻⁵ or after "
-                      "20 s", rows))
+                 curves(traces, "gradient", 0.7 * least), below)
 
 
 def growth_points(rows, traces, method):

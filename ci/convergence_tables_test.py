@@ -48,7 +48,8 @@ RAW = {"context": CONTEXT, "benchmarks": [
           paper_error=5e-4, paper_position=0.004),
     valid("vanilla_pd", "cotton", 100, (3, 20, 50, 200, -1), (10, 40, 100, 400, -1), 50.0,
           paper_iterations=6.0, paper_error=0.05, paper_position=0.04, spread=1.3),
-    raw_row("lbfgs", "cotton", 100, error_occurred=True, error_message="the reference is no minimum"),
+    raw_row("lbfgs", "cotton", 100, error_occurred=True,
+            error_message="the reference is no minimum"),
     valid("anderson", "cotton", 100, (1, 3, 9, 20, 70), (0.5, 4, 12, 24, 80), 6.0),
     valid("default", "soft", 100, (0, 1, 2, 3, 4), (1, 2, 3, 4, 5), 2.0),
     valid("default", "cotton", 900, (0, 2, 4, 5, 9), (10, 80, 100, 160, 320), 80.0),
@@ -224,8 +225,8 @@ class ConvergenceTables(unittest.TestCase):
                                        (30, 30, 30, 60, 90), 30.0, family="fig21"))
         files = make(raw, TRACES)
         self.assertIn("h = 1/60 s: cotton, 100 vertices", files["fig21.svg"])
-        self.assertIn("## cotton, n = 100, long step h = 1/60 s (our analogue of the paper's Fig. 21)",
-                      files["convergence.md"])
+        self.assertIn("## cotton, n = 100, long step h = 1/60 s (our analogue of the paper's "
+                      "Fig. 21)", files["convergence.md"])
         self.assertNotIn("fig21.svg", make(raw))
 
     def test_iterations_do_not_grow(self):

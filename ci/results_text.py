@@ -61,8 +61,8 @@ def results_json(name, records, context):
 
 
 def results_csv(records, context, first):
-    """Columns `first` before the others. The environment is repeated in every line: lines get copied
-    out of files."""
+    """Columns `first` before the others. The environment is repeated in every line: lines get
+    copied out of files."""
     where = {k: context[k] for k in ("cpu_model", "compiler", "revision", "dirty") if k in context}
     records = [{**r, **where} for r in records]
     others = sorted({k for r in records for k in r} - set(first) - set(where))
