@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include <benchmark/benchmark.h>
 
@@ -32,6 +33,24 @@ class Registration {
 class Command {
  public:
   Command(const char* name, const char* help, int (*function)());
+};
+
+/// A flag of a driver that takes a value, as --flag=VALUE. To be a static object of the driver.
+class Option {
+ public:
+  Option(const char* flag, const char* help);
+
+  /// Empty: not given.
+  [[nodiscard]] const std::string& value() const { return value_; }
+  [[nodiscard]] const char* flag() const { return flag_; }
+  [[nodiscard]] const char* help() const { return help_; }
+  /// Takes the value out of an argument; false if it is for someone else.
+  bool read(std::string_view argument);
+
+ private:
+  const char* flag_;
+  const char* help_;
+  std::string value_;
 };
 
 /// Ends a benchmark because its result is invalid; the program then exits with 5.

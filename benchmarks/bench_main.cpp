@@ -46,6 +46,11 @@ std::vector<NamedCommand>& commands() {
   return all;
 }
 
+std::vector<Option*>& options() {
+  static std::vector<Option*> all;
+  return all;
+}
+
 /// Passes everything on to the reporter that --benchmark_format names, and counts failures.
 class FailureCounter : public benchmark::BenchmarkReporter {
  public:
@@ -107,12 +112,17 @@ void warn_unless_release() {
              build_info::kBuildType);
 }
 
-/// Takes --quick out of the arguments and puts a short minimum time before what the user gave.
+/// Takes --quick and the driver's options out of the arguments and puts a short minimum time before
+/// what the user gave.
 std::vector<char*> read_own_flags(int argc, char** argv) {
   static char short_time[] = "--benchmark_min_time=0.01";
   std::vector<char*> arguments(argv, argv + argc);
   quick_mode =
       std::erase_if(arguments, [](const char* a) { return !std::strcmp(a, "--quick"); }) > 0;
+  std::erase_if(arguments, [](const char* a) {
+    return std::any_of(options().begin(), options().end(),
+                       [a](Option* option) { return option->read(a); });
+  });
   if (quick_mode) arguments.insert(arguments.begin() + 1, short_time);
   return arguments;
 }
@@ -123,6 +133,8 @@ void print_help() {
       "          [--quick]  small sizes, to see that the driver works; times mean nothing\n");
   for (const NamedCommand& command : commands())
     fmt::print("          [{}]  {}\n", command.flag, command.help);
+  for (const Option* option : options())
+    fmt::print("          [{}=VALUE]  {}\n", option->flag(), option->help());
   fmt::print("Flags of Google Benchmark:\n");
   benchmark::PrintDefaultHelp();
 }
@@ -163,6 +175,17 @@ Registration::Registration(void (*function)()) { registrations().push_back(funct
 
 Command::Command(const char* name, const char* help, int (*function)()) {
   commands().push_back({name, help, function});
+}
+
+Option::Option(const char* flag, const char* help) : flag_(flag), help_(help) {
+  options().push_back(this);
+}
+
+bool Option::read(std::string_view argument) {
+  const std::string start = std::string(flag_) + "=";
+  if (!argument.starts_with(start)) return false;
+  value_ = argument.substr(start.size());
+  return true;
 }
 
 void fail(benchmark::State& state, const std::string& reason) {

@@ -14,9 +14,10 @@ namespace {
 
 constexpr int kMostForNewton = 70000;  // vertices: beyond, its factor takes minutes
 
-scene::Scene sheet_scene(const Cloth& cloth, int side) {
+scene::Scene sheet_scene(const Cloth& cloth, int side, double h) {
   scene::Scene scene;
   scene.name = cloth.name;
+  scene.step.h = h;
   scene.solver.domains = 32;
   scene.quality.stop = "gradient";
   scene.quality.tolerance = 1e-5;
@@ -35,11 +36,11 @@ double largest(const Positions& offset) { return offset.rowwise().norm().maxCoef
 
 }  // namespace
 
-HangingSheet::HangingSheet(const Cloth& cloth, int side, int step)
-    : world_(runner::build_world(sheet_scene(cloth, side))) {
+HangingSheet::HangingSheet(const Cloth& cloth, int side, const Instant& instant)
+    : world_(runner::build_world(sheet_scene(cloth, side, instant.h))) {
   const auto integrator = runner::make_integrator(*world_);
   model::State state = integrator->initial_state(world_->part_velocity);
-  for (int i = 1; i < step; ++i) (void)integrator->step(state);
+  for (int i = 1; i < instant.step; ++i) (void)integrator->step(state);
   // The problem of the next step, seen from inside.
   previous_ = state.x;
   memory_ = state.memory;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The problem on which outer loops are compared: step 20 of the hanging sheet (scene A), on the
+// The problem on which outer loops are compared: one step of the hanging sheet (scene A), on the
 // sheet's own converged trajectory, with a converged reference.
 
 #include <memory>
@@ -21,13 +21,17 @@ struct Cloth {
 inline constexpr Cloth kCloths[] = {
     {"soft", 20, 7.014e-6}, {"cotton", 261.08, 7.014e-6}, {"stiff", 2e4, 2e-2}};
 
+/// Which step of the simulation.
+struct Instant {
+  double h = 1.0 / 120;  ///< time step, s
+  int step = 20;
+};
+
 /// One step's minimisation problem and its solution.
 class HangingSheet {
  public:
-  static constexpr int kStep = 20;
-
   /// Simulates to the step (dx 2e-7 m and below) and solves it until rounding ends progress.
-  HangingSheet(const Cloth& cloth, int side, int step = kStep);
+  HangingSheet(const Cloth& cloth, int side, const Instant& instant = {});
 
   /// Its scene may be changed, to make other minimisers of the same problem.
   [[nodiscard]] runner::World& world() { return *world_; }

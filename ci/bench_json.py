@@ -10,6 +10,9 @@ PLUMBING = {
     "error_occurred", "error_message", "aggregate_name", "aggregate_unit",
 }
 
+SKIP_PREFIX = "skipped: "  # kSkipPrefix in benchmarks/bench_main.cpp
+TO_MS = {"ns": 1e-6, "us": 1e-3, "ms": 1.0, "s": 1e3}
+
 CONTEXT_KEYS = ("date", "num_cpus", "mhz_per_cpu", "load_avg", "cpu_model", "kernel", "compiler",
                 "compiler_flags", "build_type", "revision", "dirty")
 
@@ -70,3 +73,35 @@ def short_name(row):
 def context_lines(context, keys=CONTEXT_KEYS):
     """The environment as a Markdown list, in the order of `keys`."""
     return [f"- {key}: {context[key]}" for key in keys if key in context]
+
+
+def iterations(raw):
+    """The rows as they were timed; aggregates of repetitions are left out."""
+    return [r for r in raw["benchmarks"] if r.get("run_type", "iteration") == "iteration"]
+
+
+def status_of(row):
+    """(ok | failed | skipped, why)"""
+    if not row.get("error_occurred"):
+        return "ok", ""
+    message = row.get("error_message", "")
+    if message.startswith(SKIP_PREFIX):
+        return "skipped", message[len(SKIP_PREFIX):]
+    return "failed", message
+
+
+def groups(rows, key):
+    """Rows by key(row), in order of appearance."""
+    result = {}
+    for row in rows:
+        result.setdefault(key(row), []).append(row)
+    return result
+
+
+def numbers(values):
+    """ "1, 4, 8": each once, ascending."""
+    return ", ".join(str(v) for v in sorted(set(values)))
+
+
+def plural(count, noun):
+    return f"{count} {noun}" + ("" if count == 1 else "s")

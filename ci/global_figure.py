@@ -2,10 +2,9 @@
 import math
 import statistics
 from dataclasses import dataclass, field
-from html import escape
 
-from bench_json import digits
-from global_rows import groups, plural
+from bench_json import groups, plural
+from svg import box, document, line, nice, origin, text
 
 WIDTH, HEIGHT = 1200, 700
 LEFT, RIGHT, TOP, BOTTOM = 74, 14, 76, 66  # margins around all panels
@@ -78,15 +77,6 @@ def shown_threads(rows):
     return sorted({min(threads), max(threads)}) if threads else []
 
 
-def nice(value, up):
-    """The next of 1, 2, 5 x a power of ten."""
-    decade = 10.0 ** math.floor(math.log10(value))
-    steps = [decade * s for s in (1, 2, 5, 10)]
-    if up:
-        return next(s for s in steps if s >= value * 0.9999)
-    return [s for s in steps if s <= value * 1.0001][-1]
-
-
 def ticks(scale):
     if not scale.log:
         step = nice(scale.high / 6, up=True)
@@ -115,20 +105,6 @@ def scale_of(rows, cholmod, height, log):
         # Half of the smallest, for its bar to have a height.
         return Scale(nice(min(times) / 2, up=False), 1.15 * max(times), height, True)
     return Scale(0, 1.08 * max(times), height, False)
-
-
-def text(x, y, words, size=12, anchor="middle", extra=""):
-    return (f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}"{extra}>'
-            f"{escape(words)}</text>")
-
-
-def line(x1, y1, x2, y2, style):
-    return f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" {style}/>'
-
-
-def box(x, y, width, height, colour):
-    return (f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" '
-            f'fill="{colour}"/>')
 
 
 def draw_bar(bar, x, base, width, scale):
@@ -204,17 +180,6 @@ def legend(rows):
     return out + [text(x + 38, y, "CHOLMOD, 1 thread", 12, "start")]
 
 
-def origin(context):
-    """The machine and what was measured on it."""
-    words = [context.get("cpu_model", "unknown processor"),
-             plural(int(context.get("num_cpus", 0)), "core"),
-             f"revision {str(context.get('revision', 'unknown'))[:12]}"
-             + (" + changes" if str(context.get("dirty")) == "true" else "")]
-    if str(context.get("quick")) == "true":
-        words.append("--quick: times mean nothing")
-    return ", ".join(words)
-
-
 def notes(columns, log):
     """How to read the bars."""
     words = ["CHOLMOD: median of its times beside all rows"]
@@ -255,10 +220,7 @@ def figure(rows, context):
     columns = groups([r for r in rows if r.n in with_bars], lambda r: r.n)
     log = is_log(columns)
     middle = (TOP + HEIGHT - BOTTOM) / 2
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
-           f'width="{WIDTH}" height="{HEIGHT}" font-family="sans-serif" fill="#111">',
-           box(0, 0, WIDTH, HEIGHT, "#FFF"),
-           text(WIDTH - RIGHT, 30, origin(context), 11, "end", ' fill="#555"'),
+    out = [text(WIDTH - RIGHT, 30, origin(context), 11, "end", ' fill="#555"'),
            text(LEFT, 30, "One global solve with three right-hand sides", 18, "start",
                 ' font-weight="bold"')]
     if columns:
@@ -269,4 +231,4 @@ def figure(rows, context):
                  f' transform="rotate(-90 22 {middle:.1f})"'),
             text(WIDTH / 2, HEIGHT - 28, "number of domains D", 14),
             text(WIDTH - RIGHT, HEIGHT - 8, notes(columns, log), 11, "end", ' fill="#555"')]
-    return "\n".join(out) + "\n</svg>\n"
+    return document(WIDTH, HEIGHT, out)

@@ -3,10 +3,8 @@ import re
 from dataclasses import dataclass, field
 from typing import Optional
 
-from bench_json import PLUMBING, interval_text
+from bench_json import PLUMBING, TO_MS, interval_text, iterations, status_of
 
-SKIP_PREFIX = "skipped: "  # kSkipPrefix in benchmarks/bench_main.cpp
-TO_MS = {"ns": 1e-6, "us": 1e-3, "ms": 1.0, "s": 1e3}
 DISTURBED_BELOW = 0.85  # of the row's threads
 
 # Baseline first, then from what many would write to our newest; bounds and factorisations last.
@@ -114,11 +112,8 @@ def parse(raw):
     family, method, *rest = raw["name"].split("/")
     sizes = {k: int(v) for k, v in re.findall(r"(n|D|threads):(\d+)", "/".join(rest))}
     row = Row(family, method, sizes["n"], sizes.get("D", 1), sizes.get("threads", 1))
-    if raw.get("error_occurred"):
-        message = raw.get("error_message", "")
-        skipped = message.startswith(SKIP_PREFIX)
-        row.status = "skipped" if skipped else "failed"
-        row.message = message[len(SKIP_PREFIX):] if skipped else message
+    row.status, row.message = status_of(raw)
+    if not row.ok:
         return row
     row.real_ms = raw["real_time"] * TO_MS[raw["time_unit"]]
     row.counters = {k: v for k, v in raw.items() if k not in PLUMBING}
@@ -127,22 +122,4 @@ def parse(raw):
 
 def read_rows(raw):
     """All rows, sorted; aggregates of repetitions are left out."""
-    iterations = [r for r in raw["benchmarks"] if r.get("run_type", "iteration") == "iteration"]
-    return sorted((parse(r) for r in iterations), key=lambda row: row.key)
-
-
-def groups(rows, key):
-    """Rows by key(row), in order of appearance."""
-    result = {}
-    for row in rows:
-        result.setdefault(key(row), []).append(row)
-    return result
-
-
-def numbers(values):
-    """ "1, 4, 8": each once, ascending."""
-    return ", ".join(str(v) for v in sorted(set(values)))
-
-
-def plural(count, noun):
-    return f"{count} {noun}" + ("" if count == 1 else "s")
+    return sorted((parse(r) for r in iterations(raw)), key=lambda row: row.key)
