@@ -141,6 +141,7 @@ struct Method {
   const char* accelerate;  ///< quality.accelerate; null: the default
   const char* hessian = nullptr;
   const char* linear = nullptr;
+  double seconds = 20;  ///< per sample, at most
 };
 
 constexpr Method kMethods[] = {{"default", "dd_pd", nullptr},
@@ -150,6 +151,8 @@ constexpr Method kMethods[] = {{"default", "dd_pd", nullptr},
                                {"pd_tree", "dd_pd", "none"},
                                {"newton", "newton", nullptr, "projected", "cholmod"},
                                {"newton_pcg", "newton", nullptr, "projected", "pcg"},
+                               {"pd_jacobi", "pd_jacobi", nullptr},
+                               {"xpbd", "xpbd", nullptr, nullptr, nullptr, 3},
                                {"vanilla_pd", "vanilla_pd", nullptr}};
 
 std::unique_ptr<model::Minimizer> make(const Method& method, HangingSheet& sheet) {
@@ -285,7 +288,8 @@ void convergence(benchmark::State& state, std::size_t problem, std::size_t metho
     return;
   }
   HangingSheet& sheet = *known.sheet;
-  const Limit limit{kProblems[problem].energy_error, kProblems[problem].gradient};
+  const Limit limit{kProblems[problem].energy_error, kProblems[problem].gradient,
+                    kMethods[method].seconds};
   const auto minimizer = make(kMethods[method], sheet);
   baselines::VanillaPd vanilla(sheet.world().model, sheet.world().scene.step.h, 9.81,
                                {model::StopRule::Gradient, 1e-14, 100000, 1});

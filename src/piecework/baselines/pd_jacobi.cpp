@@ -103,7 +103,8 @@ StepReport PdJacobi::minimize(const model::StepProblem& problem, Positions& x) {
   convergence_.measure_gradient(reduction_, current_.gradient, report);
   since_start_ = 0;
   plain_ = kPlainSweeps;
-  while (report.iterations < convergence_.stop().max_iterations && !report.converged) {
+  bool go_on = problem.observe(report, current_.x);
+  while (go_on && report.iterations < convergence_.stop().max_iterations && !report.converged) {
     watch.lap();
     sweep();
     report.phases.global += watch.lap();
@@ -113,6 +114,7 @@ StepReport PdJacobi::minimize(const model::StepProblem& problem, Positions& x) {
     const double rise = trial_.energy - current_.energy;
     if (rise <= rounding_.at(current_.energy, current_.x)) {  // false for NaN
       accept(report);
+      go_on = problem.observe(report, current_.x);
       report.converged = convergence_.reached(report);
     } else if (since_start_ == 0) {
       break;  // a plain sweep fails: x is not finite, or gamma was given too large

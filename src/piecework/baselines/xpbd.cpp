@@ -153,8 +153,11 @@ StepReport Xpbd::minimize(const model::StepProblem& problem, Positions& x) {
   triangles_.multiplier.setZero();
   hinges_.multiplier.setZero();
   report.phases.misc = watch.lap();
-  const bool asks_gradient = convergence_.stop().rule == model::StopRule::Gradient;
-  while (report.iterations < convergence_.stop().max_iterations && !report.converged) {
+  const bool asks_gradient =
+      convergence_.stop().rule == model::StopRule::Gradient || static_cast<bool>(problem.observer);
+  if (asks_gradient) measure(problem, report);
+  bool go_on = problem.observe(report, x_);
+  while (go_on && report.iterations < convergence_.stop().max_iterations && !report.converged) {
     before_ = x_;
     sweep(problem);
     ++report.iterations;
@@ -162,6 +165,7 @@ StepReport Xpbd::minimize(const model::StepProblem& problem, Positions& x) {
       increment_.row(i) = x_.row(reduction_.vertex(i)) - before_.row(reduction_.vertex(i));
     convergence_.measure_increment(increment_, report);
     if (asks_gradient) measure(problem, report);
+    go_on = problem.observe(report, x_);
     report.converged = convergence_.reached(report);
     if (!std::isfinite(report.dx_2)) break;  // the integrator refuses the state
   }
