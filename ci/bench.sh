@@ -5,13 +5,15 @@
 #
 #   bash ci/bench.sh [NAME ...]     e.g. partition step render convergence; default: all
 #
+# `front` is no driver but the sweeps of scenes/plans/front_*.json.
+#
 # FILTER: a regular expression of rows, e.g. FILTER='/n:(2500|19881)/'; default: all rows.
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 
 bash "$root/ci/build.sh" release
 cd "$root"
 names=("$@")
-[ ${#names[@]} -gt 0 ] || names=(partition local step render global convergence)
+[ ${#names[@]} -gt 0 ] || names=(partition local step render global convergence front)
 machine=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1 | tr -cs 'A-Za-z0-9' '-' | sed 's/-*$//')-$(nproc)cores
 mkdir -p "results/raw/$machine" results/tables results/figures
 
@@ -29,9 +31,24 @@ tables() {
   esac
 }
 
+# Time against accumulated error, from whole runs; begun sweeps are continued in out/front/.
+front() {
+  local sweeps=() cloth
+  for cloth in soft cotton cotton_fine stiff; do
+    build/release/bin/piecework sweep "scenes/plans/front_$cloth.json" -o "out/front/$cloth"
+    cp "out/front/$cloth/sweep.json" "results/raw/$machine/front_$cloth.json"
+    sweeps+=("results/raw/$machine/front_$cloth.json")
+  done
+  "$root/ci/front_tables" "${sweeps[@]}" --out results/tables --figures results/figures
+}
+
 invalid_results=5  # kCheckFailed in benchmarks/bench_main.cpp
 exit_code=0
 for name in "${names[@]}"; do
+  if [ "$name" = front ]; then
+    front
+    continue
+  fi
   raw="results/raw/$machine/$name.json"
   say "bench_$name -> $raw"
   status=0
