@@ -37,6 +37,17 @@ double ErrorEstimate::value(double least) const {
   return factor * *std::max_element(recent, increments_.end());
 }
 
+double ErrorEstimate::cautious_value(double least) const {
+  ErrorEstimate later;
+  for (std::size_t i = 1; i < increments_.size(); ++i) later.add(increments_[i]);
+  return std::max(value(least), later.value(least));
+}
+
+double ErrorEstimate::if_next(double dx_inf) const {
+  const double q = increments_.size() < 2 ? 0.5 : rate();
+  return 2 * std::max(1.0, q / (1 - q)) * dx_inf;
+}
+
 Convergence::Convergence(const ClothModel& model, double gravity, StopOptions stop)
     : stop_(stop),
       unit_box_(largest_extent(model.start)),
@@ -44,12 +55,18 @@ Convergence::Convergence(const ClothModel& model, double gravity, StopOptions st
       nodal_weight_(model.mass.sum() / static_cast<double>(model.num_free()) * gravity) {}
 
 template <class RowSquare>
-void Convergence::measure_increment(std::size_t count, const RowSquare& row_sq,
-                                    StepReport& report) {
+void Convergence::measure_length(std::size_t count, const RowSquare& row_sq,
+                                 StepReport& report) const {
   const double sum_sq = parallel_sum<double>(count, row_sq);
   report.dx_2 = std::sqrt(sum_sq) / unit_box_;
   report.dx_rms = count > 0 ? std::sqrt(sum_sq / static_cast<double>(count)) / unit_box_ : 0;
   report.dx_inf = std::sqrt(parallel_max(count, row_sq)) / unit_box_;
+}
+
+template <class RowSquare>
+void Convergence::measure_increment(std::size_t count, const RowSquare& row_sq,
+                                    StepReport& report) {
+  measure_length(count, row_sq, report);
   error_.add(report.dx_inf);
   report.error = error_.value(hidden_) * unit_box_ / mean_edge_;
 }
@@ -67,6 +84,13 @@ void Convergence::measure_increment(const Positions& dx, double step, StepReport
         return step * step * dx.row(static_cast<Eigen::Index>(i)).squaredNorm();
       },
       report);
+}
+
+void Convergence::measure_refused(const Positions& dx, StepReport& report) {
+  measure_length(
+      static_cast<std::size_t>(dx.rows()),
+      [&](std::size_t i) { return dx.row(static_cast<Eigen::Index>(i)).squaredNorm(); }, report);
+  report.error = error_.if_next(report.dx_inf) * unit_box_ / mean_edge_;
 }
 
 template <class RowSquare>

@@ -25,6 +25,11 @@ class ErrorEstimate {
   void add(double dx_inf);
   /// In the unit of the increments; infinite before two are known. \param least  of the factor
   [[nodiscard]] double value(double least) const;
+  /// The same, but the first increment of a step is no witness of decay: it undoes the strain of
+  /// the prediction, which on stiff cloth makes it larger than all that follow by orders.
+  [[nodiscard]] double cautious_value(double least) const;
+  /// The error if the next increment would be `dx_inf`, but rounding does not let it be made.
+  [[nodiscard]] double if_next(double dx_inf) const;
   /// q, at most 0.999; 1 before two increments are known.
   [[nodiscard]] double rate() const;
 
@@ -54,6 +59,10 @@ class Convergence {
   /// The same from x += step T dx, with dx row-major.
   void measure_increment(const Positions& dx, double step, StepReport& report);
 
+  /// The same from a displacement that was proposed in vain: it is what is left to do, as far as
+  /// that is known. NaN if it is not finite.
+  void measure_refused(const Positions& dx, StepReport& report);
+
   /// Fills gradient from grad E (|V| x 3, N).
   void measure_gradient(const Reduction& reduction, const Positions& gradient,
                         StepReport& report) const;
@@ -69,6 +78,11 @@ class Convergence {
     return measure(report) <= stop_.tolerance;
   }
 
+  /// The error is within the tolerance by the cautious estimate too.
+  [[nodiscard]] bool surely_holds() const {
+    return error_.cautious_value(hidden_) * unit_box_ / mean_edge_ <= stop_.tolerance;
+  }
+
   /// Iterations until the stop rule holds, if they go on like the last ones; may be infinite.
   [[nodiscard]] double expected_iterations(const StepReport& report) const;
 
@@ -77,6 +91,9 @@ class Convergence {
   [[nodiscard]] double unit_box() const { return unit_box_; }
 
  private:
+  /// Fills dx_2, dx_rms and dx_inf.
+  template <class RowSquare>
+  void measure_length(std::size_t count, const RowSquare& row_sq, StepReport& report) const;
   template <class RowSquare>
   void measure_increment(std::size_t count, const RowSquare& row_sq, StepReport& report);
   template <class RowSquare>

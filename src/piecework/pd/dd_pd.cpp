@@ -32,6 +32,11 @@ constexpr int kIterationsPerRefresh = 15;
 /// A step with normals that took no more iterations might have done without.
 constexpr int kEasyIterations = 2;
 constexpr double kLongestWait = 16;  // steps between two attempts without normals
+/// Without normals an error is believed if the gradient allows at most so many times as much...
+constexpr double kBelief = 100;
+/// ... and with them after so many iterations, none of the normals being those of the start, where
+/// the strain of the prediction bends them and hides how soft the cloth is.
+constexpr int kIterationsToBelieve = 4;
 
 // State::memory: {steps with normals from the start to go, how many the next time}. Empty: none.
 
@@ -125,14 +130,31 @@ void DdPd::refresh_normals(model::StepReport& report) {
 
 void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport& report) {
   if (options_.normals == NormalPart::Never) return;
+  const bool doubtful = convergence_.reached(report) && !believable(report);
   if (report.normal_factors > 0) {
-    if (report.iterations >= last_refresh_ + kIterationsPerRefresh) refresh_normals(report);
+    if (report.iterations >= last_refresh_ + kIterationsPerRefresh ||
+        (doubtful && last_refresh_ == 0))
+      refresh_normals(report);
     return;
   }
   const bool at_once = options_.normals == NormalPart::Always || starts_with_normals(memory);
   const bool later = report.iterations >= kPlainIterations &&
                      convergence_.expected_iterations(report) > kIterationsPerFactor;
-  if (at_once || later) refresh_normals(report);
+  if (at_once || later || doubtful) refresh_normals(report);
+}
+
+/// The estimated error extrapolates increments, and K is as stiff against rotation as against
+/// stretch: where inertia is weak beside it (stiff, light, small cloth, long steps) increments are
+/// small and decay evenly although the cloth has yet to swing by many edges. With
+/// E'' >= M / h^2, as it is up to buckling, the minimum is within h^2 M^-1 |grad E|. Where that
+/// says too little, only increments in the metric with normals, which is soft where E is, count.
+bool DdPd::believable(const model::StepReport& report) const {
+  if (options_.normals == NormalPart::Never || options_.stop.rule != model::StopRule::Error)
+    return true;
+  const double farthest = options_.h * options_.h * options_.gravity * report.gradient;
+  if (farthest <= kBelief * options_.stop.tolerance * model_.mean_edge) return true;
+  return metric_.normals_in_use() && last_refresh_ > 0 &&
+         report.iterations >= last_refresh_ + kIterationsToBelieve && convergence_.surely_holds();
 }
 
 bool DdPd::is_acceptable(double step, double slope) {
@@ -193,8 +215,10 @@ bool DdPd::move(const model::StepProblem& problem, model::StepReport& report) {
     ++report.global_solves;
     const double slope = dot(now_.g, d_);
     if (slope < 0 && line_search(problem, slope, report)) return finish(true);
-    // What was remembered misled; -P g leads down unless rounding is all that is left.
-    if (fresh) return finish(false);
+    // What was remembered misled. -P g leads down unless rounding is all that is left, or P is not
+    // positive definite: nothing has checked the 32-bit factor of Kn, which K's may outlive.
+    if (fresh && !metric_.normals_in_use()) return finish(false);
+    if (fresh) metric_.drop_normals();
     acceleration_->restart();
   }
 }
@@ -221,8 +245,8 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
          !report.stalled) {
     consider_normals(problem.memory, report);
     if (!move(problem, report)) {
-      convergence_.measure_increment(d_, 0.0, report);
-      report.converged = convergence_.holds(report);
+      convergence_.measure_refused(d_, report);
+      report.converged = convergence_.holds(report) && believable(report);
       report.stalled = !report.converged;
       break;
     }
@@ -234,7 +258,7 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
     }
     report.energy = now_.energy;
     go_on = problem.observe(report, now_.x);
-    report.converged = convergence_.reached(report);
+    report.converged = convergence_.reached(report) && believable(report);
     report.stalled = !report.converged && ++without_progress_ > kPatience;
   }
   report.degenerate_projections = now_.degenerate;

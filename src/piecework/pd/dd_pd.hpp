@@ -74,6 +74,7 @@ class DdPd final : public model::Minimizer {
   bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
+  [[nodiscard]] bool believable(const model::StepReport& report) const;
 
   const model::ClothModel& model_;
   DdPdOptions options_;

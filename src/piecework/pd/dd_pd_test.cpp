@@ -280,5 +280,63 @@ TEST(DdPd, StopsWhereRoundingIsAllThatIsLeft) {
   EXPECT_LT(report.gradient, 1e-8);
 }
 
+/// A global step that leads nowhere: what a factor beyond its precision does.
+class BrokenSolver final : public global::ExactSolver {
+ public:
+  explicit BrokenSolver(double factor) : factor_(factor) {}
+  global::SolveStatus factor(const SparseMatrix&, std::span<const int>) override {
+    return global::SolveStatus::Ok;
+  }
+  global::SolveStatus solve(global::RightHandSides& b) override {
+    b *= factor_;
+    return global::SolveStatus::Ok;
+  }
+  [[nodiscard]] const global::FactorReport& report() const override { return report_; }
+  [[nodiscard]] std::string description() const override { return "broken"; }
+
+ private:
+  double factor_;
+  global::FactorReport report_;
+};
+
+// That no direction leads down is no reason to call the start a solution.
+TEST(DdPd, AStepThatCannotBeginHasNotConverged) {
+  const JoltedCloth cloth(testing::grid_mesh(6, 6), testing::cotton(), 0.01);
+  for (const double factor : {std::numeric_limits<double>::quiet_NaN(), -1.0})
+    for (const StopRule rule : {StopRule::Error, StopRule::DxInf, StopRule::Gradient}) {
+      DdPd solver(cloth.model, options(Lbfgs, NormalPart::Never, {rule, 1e-3, 50, 1}),
+                  std::make_unique<BrokenSolver>(factor));
+      Positions x;
+      const auto report = cloth.solve(solver, x);
+      EXPECT_FALSE(report.converged);
+      EXPECT_TRUE(report.stalled);
+      EXPECT_TRUE(x.allFinite());
+    }
+}
+
+/// A stiff sheet that a free fall of many edges would tear off its two pins: it has to swing.
+JoltedCloth swinging_plate() {
+  JoltedCloth cloth(testing::grid_mesh(10, 10, 1e-3),
+                    {.density = 0.2, .stretching = 1e3, .bending = 1e-5}, 0);
+  for (int v = 0; v < cloth.rest.num_vertices(); ++v)
+    if (cloth.fixed[static_cast<std::size_t>(v)] == 0)
+      cloth.z(v, 1) -= JoltedCloth::kGravity * JoltedCloth::kH * JoltedCloth::kH;
+  return cloth;
+}
+
+// Increments are small there from the first iteration on, in the metric K^-1 at least.
+TEST(DdPd, AStiffPlateThatHasYetToSwingHasNotConverged) {
+  const JoltedCloth cloth = swinging_plate();
+  DdPd solver(cloth.model, options(Lbfgs, NormalPart::Automatic, {}), tree());
+  Positions x;
+  const auto report = cloth.solve(solver, x);
+  DdPd reference = engine(cloth, {StopRule::Gradient, 1e-6, 20000, 1});
+  Positions expected = x;
+  const auto exact = reference.minimize(cloth.problem(), expected);
+  ASSERT_TRUE(exact.converged || exact.stalled);
+  if (report.converged)
+    EXPECT_LT((x - expected).rowwise().norm().maxCoeff(), 0.1 * cloth.model.mean_edge);
+}
+
 }  // namespace
 }  // namespace piecework::pd

@@ -1,5 +1,6 @@
 #include <piecework/pd/metric.hpp>
 
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -9,16 +10,34 @@
 #include <piecework/global/eigen_views.hpp>
 
 namespace piecework::pd {
+namespace {
+
+/// Kn is soft where cloth swings freely: there only inertia is left of it. In 32 bits that is lost
+/// in the rounding of the stiffest entries if it is below them by more than this, and what is
+/// factored then is noise, positive definite or not.
+constexpr double kMostOf32Bits = 1e8;
+
+/// Stiffest diagonal entry over the least inertia, which is what the rows of K sum to.
+double stiffness_ratio(const SparseMatrix& K) {
+  const Eigen::VectorXd inertia = K * Eigen::VectorXd::Ones(K.cols());
+  const double least = inertia.size() > 0 ? inertia.minCoeff() : 1.0;
+  return least > 0 ? K.diagonal().maxCoeff() / least : std::numeric_limits<double>::infinity();
+}
+
+/// A metric only shapes the path to the minimum: 32 bits do, and their error is not estimated.
+global::TreeOptions normal_options(const SparseMatrix& K) {
+  if (stiffness_ratio(K) > kMostOf32Bits) return {};
+  return {.precision = global::Precision::Single, .factor_in_single = true, .contraction_limit = 0};
+}
+
+}  // namespace
 
 Metric::Metric(const model::ClothModel& model, SparseMatrix K,
                std::unique_ptr<global::ExactSolver> solver)
     : model_(model),
       K_(std::move(K)),
       solver_(std::move(solver)),
-      // A metric only shapes the path to the minimum: 32 bits do, and their error is not estimated.
-      normal_solver_({.precision = global::Precision::Single,
-                      .factor_in_single = true,
-                      .contraction_limit = 0}) {}
+      normal_solver_(normal_options(K_)) {}
 
 Metric::~Metric() = default;
 
