@@ -34,9 +34,10 @@ constexpr int kEasyIterations = 2;
 constexpr double kLongestWait = 16;  // steps between two attempts without normals
 /// Without normals an error is believed if the gradient allows at most so many times as much...
 constexpr double kBelief = 100;
-/// ... and with them after so many iterations, none of the normals being those of the start, where
-/// the strain of the prediction bends them and hides how soft the cloth is.
+/// ... and with them after so many iterations, and if the gradient has fallen by no more than this
+/// since they were taken: strain that has gone meanwhile bent them and hid how soft the cloth is.
 constexpr int kIterationsToBelieve = 4;
+constexpr double kOutdated = 100;
 
 // State::memory: {steps with normals from the start to go, how many the next time}. Empty: none.
 
@@ -125,6 +126,7 @@ void DdPd::refresh_normals(model::StepReport& report) {
   acceleration_->metric_changed();
   ++report.normal_factors;
   last_refresh_ = report.iterations;
+  gradient_at_refresh_ = report.gradient;
   report.phases.refactor = std::max(0.0, report.phases.refactor) + watch.elapsed_ms();
 }
 
@@ -133,7 +135,7 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
   const bool doubtful = convergence_.reached(report) && !believable(report);
   if (report.normal_factors > 0) {
     if (report.iterations >= last_refresh_ + kIterationsPerRefresh ||
-        (doubtful && last_refresh_ == 0))
+        (doubtful && normals_are_outdated(report)))
       refresh_normals(report);
     return;
   }
@@ -141,6 +143,10 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
   const bool later = report.iterations >= kPlainIterations &&
                      convergence_.expected_iterations(report) > kIterationsPerFactor;
   if (at_once || later || doubtful) refresh_normals(report);
+}
+
+bool DdPd::normals_are_outdated(const model::StepReport& report) const {
+  return gradient_at_refresh_ > kOutdated * report.gradient;
 }
 
 /// The estimated error extrapolates increments, and K is as stiff against rotation as against
@@ -153,7 +159,7 @@ bool DdPd::believable(const model::StepReport& report) const {
     return true;
   const double farthest = options_.h * options_.h * options_.gravity * report.gradient;
   if (farthest <= kBelief * options_.stop.tolerance * model_.mean_edge) return true;
-  return metric_.normals_in_use() && last_refresh_ > 0 &&
+  return metric_.normals_in_use() && !normals_are_outdated(report) &&
          report.iterations >= last_refresh_ + kIterationsToBelieve && convergence_.surely_holds();
 }
 

@@ -74,6 +74,7 @@ class DdPd final : public model::Minimizer {
   bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
+  [[nodiscard]] bool normals_are_outdated(const model::StepReport& report) const;
   [[nodiscard]] bool believable(const model::StepReport& report) const;
 
   const model::ClothModel& model_;
@@ -86,8 +87,9 @@ class DdPd final : public model::Minimizer {
   local::JacobiStep local_;
   const decomposition::Decomposition* domains_;
   std::unique_ptr<local::GaussSeidel> sweeps_;
-  Positions moved_;           ///< n_f x 3: displacement with the sweep
-  int last_refresh_ = 0;      ///< iteration of the step
+  Positions moved_;       ///< n_f x 3: displacement with the sweep
+  int last_refresh_ = 0;  ///< iteration of the step
+  double gradient_at_refresh_ = 0;
   int without_progress_ = 0;  ///< iterations
   Point now_, trial_;
   Positions gradient_;  ///< |V| x 3
