@@ -137,7 +137,7 @@ void report_convergence(const runner::RunOutcome& outcome) {
   const runner::Totals sum = runner::totals(outcome.record.frames);
   const scene::Quality& quality = outcome.world->scene.quality;
   if (sum.converged_steps < sum.steps && quality.stop != "iterations")
-    say("note: {} of {} steps stopped at {} iterations before `{}` reached {:g}\n",
+    say("note: {} of {} steps ended (at most {} iterations) before `{}` reached {:g}\n",
         sum.steps - sum.converged_steps, sum.steps, quality.max_iterations, quality.stop,
         quality.tolerance);
 }
