@@ -3,36 +3,20 @@
 // One time step of a small cloth, for the tests of every minimiser.
 
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/model/stepper.hpp>
-#include <piecework/testing/newton_oracle.hpp>
-#include <piecework/testing/small_cloths.hpp>
+#include <piecework/testing/jolted_cloth.hpp>
 
 namespace piecework::baselines {
 
-inline constexpr double kTestH = 1.0 / 120.0;  // s
-inline constexpr double kTestGravity = 9.81;   // m/s^2
+inline constexpr double kTestH = testing::JoltedCloth::kH;
+inline constexpr double kTestGravity = testing::JoltedCloth::kGravity;
 
-/// A cloth whose prediction is its rest shape with every vertex off by up to `jolt` m; vertices 0
-/// and 1 are held.
-struct TestStep {
-  mesh::TriangleMesh rest;
-  model::Material material;
-  model::ClothModel model;
-  Positions z;
-  std::vector<char> fixed;
-
-  TestStep(mesh::TriangleMesh mesh, model::Material m, double jolt)
-      : rest(std::move(mesh)),
-        material(m),
-        model(testing::cloth_model(rest, material)),
-        z(rest.positions + testing::random_positions(rest.num_vertices(), jolt, 11)),
-        fixed(static_cast<std::size_t>(rest.num_vertices()), 0) {
-    hold({0, 1});
-  }
+/// With what the tests of baselines do with it.
+struct TestStep : testing::JoltedCloth {
+  using JoltedCloth::JoltedCloth;
 
   void hold(const std::vector<int>& vertices) {
     for (const int v : vertices) {
@@ -41,11 +25,9 @@ struct TestStep {
     }
   }
 
-  [[nodiscard]] model::StepProblem problem() const { return {&z, &fixed, &model.start}; }
-
   /// The oracle's minimum next to x.
   [[nodiscard]] Positions oracle(const Positions& x) const {
-    return testing::oracle_minimize({&rest, material, kTestH, z, fixed}, x);
+    return testing::oracle_minimize(JoltedCloth::oracle(), x);
   }
 
   /// A minimiser of type M from x = z.

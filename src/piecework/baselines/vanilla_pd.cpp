@@ -31,13 +31,7 @@ void VanillaPd::prepare(const std::vector<char>& fixed) {
   reduction_ = model::Reduction(model_, fixed);
   increment_.resize(reduction_.count(), 3);
   const auto status = solver_->factor(reduction_.system(K_), reduction_.vertices());
-  if (status == global::SolveStatus::OutOfMemory)
-    throw SimulationError(
-        fmt::format("the factor of {} unknowns does not fit into memory", reduction_.count()));
-  if (status != global::SolveStatus::Ok)
-    throw SimulationError(
-        "the system matrix is not positive definite; stiffness, density or h are "
-        "too extreme for double precision: bring them closer together");
+  global::require_factor(status, reduction_.count());
 }
 
 model::SetupReport VanillaPd::setup_report() const {

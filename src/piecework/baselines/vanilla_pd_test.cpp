@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <piecework/baselines/step_test_util.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/testing/newton_oracle.hpp>
@@ -12,30 +13,13 @@ namespace {
 
 using model::StopRule;
 
-constexpr double kH = 1.0 / 120.0;
-constexpr double kGravity = 9.81;
+constexpr double kH = kTestH;
+constexpr double kGravity = kTestGravity;
 
-struct Problem {
-  mesh::TriangleMesh rest;
-  model::Material material;
-  model::ClothModel model;
-  Positions z;
-  std::vector<char> fixed;
-
-  Problem(mesh::TriangleMesh mesh, model::Material m, double jolt)
-      : rest(std::move(mesh)),
-        material(m),
-        model(testing::cloth_model(rest, material)),
-        z(rest.positions + testing::random_positions(rest.num_vertices(), jolt, 11)),
-        fixed(static_cast<std::size_t>(rest.num_vertices()), 0) {
-    for (const int v : {0, 1}) {
-      fixed[static_cast<std::size_t>(v)] = 1;
-      z.row(v) = rest.positions.row(v);
-    }
-  }
-  [[nodiscard]] model::StepReport solve(model::StopOptions stop, Positions& x) const {
-    x = z;
-    return VanillaPd(model, kH, kGravity, stop).minimize({&z, &fixed, &model.start}, x);
+struct Problem : TestStep {
+  using TestStep::TestStep;
+  model::StepReport solve(model::StopOptions stop, Positions& x) const {
+    return TestStep::solve<VanillaPd>(stop, x);
   }
 };
 
@@ -52,7 +36,7 @@ TEST_P(VanillaPdAgainstNewton, FindsAMinimumOfTheIncrementalPotential) {
   Positions x;
   const auto report = p.solve({StopRule::Gradient, 1e-11, 20000, 1}, x);
   ASSERT_TRUE(report.converged) << report.gradient;
-  const Positions newton = testing::oracle_minimize({&p.rest, p.material, kH, p.z, p.fixed}, x);
+  const Positions newton = p.oracle(x);
   const double motion = (x - p.z).cwiseAbs().maxCoeff();
   ASSERT_GT(motion, 1e-4) << "nothing moved, nothing was tested";
   EXPECT_LT((x - newton).cwiseAbs().maxCoeff(), 1e-8 * 0.3);

@@ -1,5 +1,8 @@
 #include <piecework/global/exact_solver.hpp>
 
+#include <fmt/format.h>
+
+#include <piecework/core/error.hpp>
 #include <piecework/global/eigen_views.hpp>
 
 namespace piecework::global {
@@ -37,6 +40,16 @@ class TreeExactSolver final : public ExactSolver {
 };
 
 }  // namespace
+
+void require_factor(SolveStatus status, int unknowns) {
+  if (status == SolveStatus::OutOfMemory)
+    throw SimulationError(
+        fmt::format("the factor of {} unknowns does not fit into memory", unknowns));
+  if (status != SolveStatus::Ok)
+    throw SimulationError(
+        "the system matrix is not positive definite; stiffness, density or h are "
+        "too extreme for double precision: bring them closer together");
+}
 
 std::unique_ptr<ExactSolver> make_tree_solver(VertexTree domains, const TreeOptions& options) {
   return std::make_unique<TreeExactSolver>(std::move(domains), options);

@@ -39,6 +39,10 @@ class ExactSolver {
   [[nodiscard]] virtual std::string description() const = 0;
 };
 
+/// For callers that cannot go on without a factor.
+/// \throws SimulationError unless Ok, with what to change.
+void require_factor(SolveStatus status, int unknowns);
+
 /// The borders of cloth domains per vertex; see DomainTree. Empty: no domains.
 struct VertexTree {
   std::vector<int> node_parent;

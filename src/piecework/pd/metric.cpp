@@ -47,13 +47,7 @@ void Metric::prepare(const std::vector<char>& fixed) {
   reduction_ = model::Reduction(model_, fixed);
   reduced_ = reduction_.system(K_);
   const auto status = solver_->factor(reduced_, reduction_.vertices());
-  if (status == global::SolveStatus::OutOfMemory)
-    throw SimulationError(
-        fmt::format("the factor of {} unknowns does not fit into memory", reduction_.count()));
-  if (status != global::SolveStatus::Ok)
-    throw SimulationError(
-        "the system matrix is not positive definite; stiffness, density or h are "
-        "too extreme for double precision: bring them closer together");
+  global::require_factor(status, reduction_.count());
 }
 
 bool Metric::refresh_normals(const Positions& x) {
