@@ -30,7 +30,7 @@ void extremes(benchmark::State& state, const Extreme& extreme) {
   state.counters["steps"] = result.steps;
   state.counters["converged_steps"] = result.converged;
   state.counters["stalled_steps"] = result.stalled;
-  state.counters["iterations"] = result.iterations;
+  state.counters["lg_iterations"] = result.iterations;
   state.counters["gradient"] = result.gradient;
   state.counters["error"] = result.error;
   state.counters["energy_drift"] = result.drift;
