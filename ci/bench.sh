@@ -13,7 +13,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 bash "$root/ci/build.sh" release
 cd "$root"
 names=("$@")
-[ ${#names[@]} -gt 0 ] || names=(partition local step render global convergence front)
+[ ${#names[@]} -gt 0 ] || names=(partition local step render global extremes convergence front)
 machine=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1 | tr -cs 'A-Za-z0-9' '-' | sed 's/-*$//')-$(nproc)cores
 mkdir -p "results/raw/$machine" results/tables results/figures
 
