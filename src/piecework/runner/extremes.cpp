@@ -20,6 +20,7 @@
 #include <piecework/model/convergence.hpp>
 #include <piecework/model/measures.hpp>
 #include <piecework/model/reduction.hpp>
+#include <piecework/runner/methods.hpp>
 
 namespace piecework::runner {
 namespace {
@@ -433,7 +434,7 @@ std::vector<Extreme> extremes() {
            {"contrast_halves", "h_0.2", "single"},
            {"contrast_halves", "stretch_1e09", "cholmod"},
            {"seam_to_soft", "stretch_1e09"},
-           {"seam_to_stiff", "h_0.2", "primal_dual"},
+           {"seam_to_stiff", "h_0.0333333", "primal_dual"},
            {"seam_to_stiff", "density_0.001", "wind_10"},
            // Free cloth.
            {"density_0.001", "wind_10", "single", "free"},
