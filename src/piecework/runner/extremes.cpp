@@ -186,8 +186,7 @@ void simulate(const Extreme& extreme, bool verify, ExtremeResult& result) {
     result.degenerate = std::max(result.degenerate, report.degenerate_projections);
     result.gradient = std::max(result.gradient, report.gradient);
     if (!report.converged)
-      result.unsolved =
-          std::max(result.unsolved, referee.left_of_gradient(state.x, state.time));
+      result.unsolved = std::max(result.unsolved, referee.left_of_gradient(state.x, state.time));
     else if (verify)
       result.error = std::max(result.error, referee.error(state.x));
     result.ms += report.step_ms;
@@ -255,8 +254,7 @@ void sew_on(Extreme& e, const scene::Material& other) {
   second.velocity = cloth(e).velocity;
   e.scene.materials["other"] = other;
   e.scene.cloths.push_back(second);
-  e.scene.seams.push_back(
-      {.cloth = "sheet", .to = "other", .set = "top", .to_set = "bottom"});
+  e.scene.seams.push_back({.cloth = "sheet", .to = "other", .set = "top", .to_set = "bottom"});
 }
 
 /// Moves every vertex of the start by up to this far.
@@ -270,8 +268,8 @@ void shake(Extreme& e, double distance) {
 
 /// Only the first triangle is left.
 void one_triangle(Extreme& e) {
-  const auto path = std::filesystem::temp_directory_path() /
-                    fmt::format("piecework_triangle_{}.obj", ::getpid());
+  const auto path =
+      std::filesystem::temp_directory_path() / fmt::format("piecework_triangle_{}.obj", ::getpid());
   write_file_atomically(path, "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
   cloth(e).mesh = {};
   cloth(e).mesh.file = path.string();
@@ -340,7 +338,8 @@ std::vector<Change> changes() {
                   [=](Extreme& e) { function(e, number); }};
   };
   std::vector<Change> all;
-  for (const double k : {1.0, 1e2, 1e5, 1e6, 1e7, 1e8, 1e9}) all.push_back(value("stretch", stretch, k));
+  for (const double k : {1.0, 1e2, 1e5, 1e6, 1e7, 1e8, 1e9})
+    all.push_back(value("stretch", stretch, k));
   for (const double d : {0.0, 1e-3, 1.0, 1e3}) all.push_back(value("bending", bending, d));
   for (const double rho : {1e-3, 1e2, 1e4}) all.push_back(value("density", density, rho));
   for (const double h : {1.0 / 2000, 1.0 / 30, 1.0 / 5}) all.push_back(value("h", step_length, h));
