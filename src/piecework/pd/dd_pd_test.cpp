@@ -334,8 +334,9 @@ TEST(DdPd, AStiffPlateThatHasYetToSwingHasNotConverged) {
   Positions expected = x;
   const auto exact = reference.minimize(cloth.problem(), expected);
   ASSERT_TRUE(exact.converged || exact.stalled);
-  if (report.converged)
+  if (report.converged) {
     EXPECT_LT((x - expected).rowwise().norm().maxCoeff(), 0.1 * cloth.model.mean_edge);
+  }
 }
 
 }  // namespace

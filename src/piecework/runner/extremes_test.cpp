@@ -2,6 +2,7 @@
 // "converged" and is not, or a refusal that says what to change.
 
 #include <algorithm>
+#include <cctype>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -21,7 +22,9 @@ class Extremes : public ::testing::TestWithParam<Extreme> {};
 TEST_P(Extremes, EndsWell) {
   const ExtremeResult result = run_extreme(GetParam());
   EXPECT_EQ(fault_of(GetParam(), result), "");
-  if (result.refusal.empty()) EXPECT_EQ(result.steps, GetParam().scene.step.steps);
+  if (result.refusal.empty()) {
+    EXPECT_EQ(result.steps, GetParam().scene.step.steps);
+  }
 }
 
 std::string test_name(const ::testing::TestParamInfo<Extreme>& info) {
