@@ -2,6 +2,7 @@
 // "converged" and is not, or a refusal that says what to change.
 
 #include <algorithm>
+#include <cctype>
 #include <ostream>
 #include <string>
 #include <vector>
