@@ -22,7 +22,6 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
-#include <piecework/baselines/newton.hpp>
 #include <piecework/baselines/vanilla_pd.hpp>
 #include <piecework/core/atomic_file.hpp>
 #include <piecework/core/clock.hpp>
@@ -165,17 +164,9 @@ std::unique_ptr<model::Minimizer> make(const Method& method, HangingSheet& sheet
   scene.solver.method = method.method;
   if (method.accelerate) scene.quality.accelerate = method.accelerate;
   if (std::string(method.method) == "vanilla_pd") scene.solver.global = "single";
-  const model::StopOptions stop{model::StopRule::Gradient, 1e-14, 100000, 1};
-  std::unique_ptr<model::Minimizer> minimizer;
-  if (method.hessian)
-    minimizer = std::make_unique<baselines::Newton>(
-        sheet.world().model, scene.step.h, 9.81, stop,
-        baselines::NewtonOptions{.hessian = model::HessianForm::Projected,
-                                 .linear = std::string(method.linear) == "pcg"
-                                               ? baselines::NewtonLinear::Pcg
-                                               : baselines::NewtonLinear::Cholmod});
-  else
-    minimizer = runner::make_minimizer(sheet.world());
+  if (method.hessian) scene.solver.hessian = method.hessian;
+  if (method.linear) scene.solver.linear = method.linear;
+  auto minimizer = runner::make_minimizer(sheet.world());
   scene = kept;
   return minimizer;
 }

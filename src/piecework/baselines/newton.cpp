@@ -109,12 +109,16 @@ bool Newton::iterate(const model::StepProblem& problem, StepReport& report) {
   return true;
 }
 
-bool Newton::find_direction(const model::StepProblem& problem, HessianForm form,
-                            StepReport& report) {
+void Newton::take_residual() {
   parallel_for(static_cast<std::size_t>(reduction_.count()), [&](std::size_t i) {
     rhs_.row(static_cast<Eigen::Index>(i)) =
         -reduction_.row(current_.gradient, static_cast<int>(i));
   });
+}
+
+bool Newton::find_direction(const model::StepProblem& problem, HessianForm form,
+                            StepReport& report) {
+  take_residual();
   if (!solve(problem, form, report)) return false;
   return slope(current_.gradient) <= 0;  // false for NaN; 0 at a stationary point to the last bit
 }
@@ -190,10 +194,7 @@ void Newton::estimate_error(StepReport& report) {
   // Ratios of three increments, which the default estimate waits for, would cost more iterations
   // than the step. One more solve with the factor at hand gives the next increment, nearly.
   Stopwatch watch;
-  parallel_for(static_cast<std::size_t>(reduction_.count()), [&](std::size_t i) {
-    rhs_.row(static_cast<Eigen::Index>(i)) =
-        -reduction_.row(current_.gradient, static_cast<int>(i));
-  });
+  take_residual();
   if (cholmod_.solve(rhs_.data(), 1) != global::SolveStatus::Ok) return;
   ++report.global_solves;
   const auto length_sq = [](const auto& rows) {

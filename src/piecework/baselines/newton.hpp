@@ -59,6 +59,8 @@ class Newton final : public model::Minimizer {
   };
 
   void evaluate(const model::StepProblem& problem, Point& point);
+  /// rhs_ = -grad E at current_, on the unknowns.
+  void take_residual();
   /// direction_ from H of this form at current_; false if that H will not do.
   bool find_direction(const model::StepProblem& problem, model::HessianForm form,
                       model::StepReport& report);

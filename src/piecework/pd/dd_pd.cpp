@@ -122,7 +122,7 @@ void DdPd::choose_start(const model::StepProblem& problem, const Positions& pred
 
 void DdPd::refresh_normals(model::StepReport& report) {
   const Stopwatch watch;
-  if (metric_.refresh_normals(now_.x)) convergence_.assume_stiffness_ratio(1);
+  metric_.refresh_normals(now_.x);
   acceleration_->metric_changed();
   ++report.normal_factors;
   last_refresh_ = report.iterations;
@@ -186,6 +186,7 @@ void DdPd::accept(double step, model::StepReport& report) {
   const Positions& moved = sweeps_ ? moved_ : d_;
   const double scale = sweeps_ ? 1.0 : step;
   acceleration_->accept(scale, moved, now_.g, trial_.g);
+  convergence_.assume_stiffness_ratio(metric_.normals_in_use() ? 1.0 : stiffness_ratio_);
   convergence_.measure_increment(moved, scale, report);
   std::swap(now_, trial_);
 }
@@ -240,7 +241,6 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   convergence_.begin();
   acceleration_->restart();
   metric_.drop_normals();
-  convergence_.assume_stiffness_ratio(stiffness_ratio_);
   choose_start(problem, x, report);
   convergence_.measure_gradient(now_.g, report);
   report.energy = now_.energy;

@@ -18,7 +18,7 @@ namespace {
 constexpr double kMostOf32Bits = 1e8;
 
 /// Stiffest diagonal entry over the least inertia, which is what the rows of K sum to.
-double stiffness_ratio(const SparseMatrix& K) {
+double dynamic_range(const SparseMatrix& K) {
   const Eigen::VectorXd inertia = K * Eigen::VectorXd::Ones(K.cols());
   const double least = inertia.size() > 0 ? inertia.minCoeff() : 1.0;
   return least > 0 ? K.diagonal().maxCoeff() / least : std::numeric_limits<double>::infinity();
@@ -26,7 +26,7 @@ double stiffness_ratio(const SparseMatrix& K) {
 
 /// A metric only shapes the path to the minimum: 32 bits do, and their error is not estimated.
 global::TreeOptions normal_options(const SparseMatrix& K) {
-  if (stiffness_ratio(K) > kMostOf32Bits) return {};
+  if (dynamic_range(K) > kMostOf32Bits) return {};
   return {.precision = global::Precision::Single, .factor_in_single = true, .contraction_limit = 0};
 }
 

@@ -1,13 +1,13 @@
 #include <piecework/pd/normal_matrix.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 #include <vector>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/mesh/topology.hpp>
+#include <piecework/model/hessian.hpp>
 #include <piecework/model/projection.hpp>
 
 #include "kernels.hpp"
@@ -15,47 +15,12 @@
 namespace piecework::pd {
 namespace {
 
-constexpr double kInverseSqrt2 = 0.70710678118654752440;
-
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
-/// The eigenvalues of symmetric B above 1 become 1: no stiffness is taken away twice.
-Mat2 clamped(const Mat2& B) {
-  const double mean = 0.5 * (B(0, 0) + B(1, 1));
-  const double half_gap = std::hypot(0.5 * (B(0, 0) - B(1, 1)), B(0, 1));
-  if (mean + half_gap <= 1) return B;
-  if (!(mean - half_gap < 1)) return Mat2::Identity();
-  // The projector onto the larger eigenvalue is (B - smaller I) / (larger - smaller).
-  const double scale = (mean + half_gap - 1) / (2 * half_gap);
-  return B - scale * (B - (mean - half_gap) * Mat2::Identity());
-}
-
-/// What of w |F - R|^2's Hessian projective dynamics leaves out, per unit weight.
-struct Softening {
-  Vec3 normal, R1, R2;
-  double c_T;  ///< of the in-plane rotation
-  Mat2 B;      ///< of motion along the normal
-};
-
-bool softening(const Mat32& F, Softening& result) {
-  Mat32 R;
-  if (!model::closest_isometry(F, R)) return false;  // a collapsed triangle keeps K's stiffness
-  const Vec3 area = F.col(0).cross(F.col(1));
-  const double s = area.norm();
-  const double aa = F.col(0).squaredNorm();
-  const double bb = F.col(1).squaredNorm();
-  const double ab = F.col(0).dot(F.col(1));
-  const double trace = std::sqrt(aa + bb + 2 * s);  // of S = (F^T F)^1/2
-  Mat2 inverse;
-  inverse << bb + s, -ab, -ab, aa + s;
-  result = {area / s, R.col(0), R.col(1), std::min(1.0, 2 / trace), clamped(inverse / (s * trace))};
-  return result.B.allFinite();
-}
-
-/// What an unknown contributes to a triangle's deformation gradient: F += x_u G^T.
+/// How much of each corner of a triangle an unknown carries.
 struct Use {
   int unknown;
-  Vec2 G;
+  Vec3 share;
 };
 
 /// A triangle with slaves of seams: its corners hang on more than three unknowns.
@@ -153,20 +118,17 @@ void NormalMatrix::Impl::add_plain(std::size_t t) {
 
 void NormalMatrix::Impl::add_sewn(std::size_t t) {
   const model::StretchConstraint& c = model.stretch[t];
-  const Vec2 G1 = c.rest_inverse.row(0).transpose();
-  const Vec2 G2 = c.rest_inverse.row(1).transpose();
-  const std::array<Vec2, 3> G{-(G1 + G2), G1, G2};
   const auto first = static_cast<std::ptrdiff_t>(uses.size());
-  for (std::size_t k = 0; k < 3; ++k)
-    model.sewing.map().visit_carriers(c.vertices[k], [&](int carrier, double weight) {
+  for (int k = 0; k < 3; ++k)
+    model.sewing.map().visit_carriers(c.vertices[at(k)], [&](int carrier, double weight) {
       const int unknown = reduction.number(carrier);
       if (unknown < 0) return;
       const auto same = std::find_if(uses.begin() + first, uses.end(),
                                      [&](const Use& use) { return use.unknown == unknown; });
       if (same == uses.end())
-        uses.push_back({unknown, weight * G[k]});
+        uses.push_back({unknown, weight * Vec3::Unit(k)});
       else
-        same->G += weight * G[k];
+        same->share[k] += weight;
     });
   const int count = static_cast<int>(std::ssize(uses) - first);
   sewn.push_back(
@@ -237,23 +199,24 @@ void NormalMatrix::Impl::find_normals(const Positions& x) {
 void NormalMatrix::Impl::fill_sewn(const SewnTriangle& s, const Positions& x) {
   const model::StretchConstraint& c = model.stretch[at(s.triangle)];
   double* pair = pair_value.data() + s.first_pair;
-  Softening soft;
-  if (!softening(model::deformation_gradient(c, x), soft)) {
+  const Mat32 F = model::deformation_gradient(c, x);
+  Mat32 R;
+  if (!model::closest_isometry(F, R)) {  // a collapsed triangle keeps K's stiffness
     std::fill_n(pair, s.num_uses * (s.num_uses + 1) / 2, 0.0);
     return;
   }
-  const auto normal = [&](const Use& use) { return normals.row(use.unknown); };
-  const auto rotation = [&](const Use& use) {  // t_a . n_a
-    return kInverseSqrt2 *
-           (use.G[1] * normal(use).dot(soft.R1) - use.G[0] * normal(use).dot(soft.R2));
-  };
+  const auto soft = model::stretch_softening(c, F, R, model::HessianForm::Projected);
   for (int i = 0; i < s.num_uses; ++i) {
     const Use& a = uses[at(s.first_use + i)];
-    const double turn_a = soft.c_T * rotation(a);
-    const Vec2 out_a = soft.B * a.G * normal(a).dot(soft.normal);
+    const auto n_a = normals.row(a.unknown);
+    const double turn_a = n_a * soft.twist * a.share;
+    const double out_a = n_a * soft.normal;
     for (int j = 0; j <= i; ++j) {
       const Use& b = uses[at(s.first_use + j)];
-      *pair++ = c.weight * (turn_a * rotation(b) + out_a.dot(b.G) * normal(b).dot(soft.normal));
+      const auto n_b = normals.row(b.unknown);
+      const double turn_b = n_b * soft.twist * b.share;
+      const double out_b = n_b * soft.normal;
+      *pair++ = turn_a * turn_b + a.share.dot(soft.bend * b.share) * out_a * out_b;
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace piecework::runner {
 
@@ -27,6 +28,19 @@ std::string median_cell(const MedianInterval& median) {
   if (median.count < kMinSamplesForInterval) return three_digits(median.median);
   return fmt::format("{} [{}-{}]", three_digits(median.median), three_digits(median.low),
                      three_digits(median.high));
+}
+
+std::string list_of(const std::string& json) {
+  std::string text;
+  const auto object = nlohmann::ordered_json::parse(json);
+  for (const auto& [key, value] : object.items())
+    text +=
+        fmt::format("- {}: {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+  return text;
+}
+
+std::string csv_number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.9g}", value) : "";
 }
 
 }  // namespace piecework::runner

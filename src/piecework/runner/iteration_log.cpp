@@ -1,13 +1,13 @@
 #include <piecework/runner/iteration_log.hpp>
 
 #include <charconv>
-#include <cmath>
 #include <iterator>
 #include <sstream>
 
 #include <fmt/format.h>
 
 #include <piecework/core/atomic_file.hpp>
+#include <piecework/runner/cells.hpp>
 
 namespace piecework::runner {
 namespace {
@@ -30,9 +30,6 @@ std::string lines_until(const std::string& text, int last_step) {
   return kept;
 }
 
-/// What is not known yet is an empty cell.
-std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : ""; }
-
 }  // namespace
 
 IterationLog::IterationLog(const std::filesystem::path& directory, int last_step)
@@ -46,10 +43,10 @@ void IterationLog::attach(model::Integrator& integrator) {
       [this](int step, const model::StepReport& report, const Positions& /*x*/) {
         const bool start = report.iterations == 0;
         fmt::format_to(std::back_inserter(text_), "{},{},{},{},{},{},{},{},{}\r\n", step,
-                       report.iterations, cell(report.energy), cell(report.gradient),
-                       start ? "" : cell(report.error), start ? "" : cell(report.dx_2),
-                       start ? "" : cell(report.dx_rms), start ? "" : cell(report.dx_inf),
-                       report.evaluations);
+                       report.iterations, csv_number(report.energy), csv_number(report.gradient),
+                       start ? "" : csv_number(report.error), start ? "" : csv_number(report.dx_2),
+                       start ? "" : csv_number(report.dx_rms),
+                       start ? "" : csv_number(report.dx_inf), report.evaluations);
         return true;
       });
 }

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include <piecework/core/statistics.hpp>
 #include <piecework/runner/cells.hpp>
@@ -138,13 +137,9 @@ std::string convergence_line(const RunRecord& record, const World& world) {
 }
 
 std::string environment_list(const RunRecord& record) {
-  std::string text;
-  const auto json = nlohmann::ordered_json::parse(record.environment_json);
-  for (const auto& [key, value] : json.items())
-    text += fmt::format("- {}: {}\n", key, value.get<std::string>());
-  text += fmt::format("- threads: {}\n- load before and after: {:.2f}, {:.2f}\n", record.threads,
-                      record.load_before, record.load_after);
-  return text;
+  return list_of(record.environment_json) +
+         fmt::format("- threads: {}\n- load before and after: {:.2f}, {:.2f}\n", record.threads,
+                     record.load_before, record.load_after);
 }
 
 /// What was not as in the scene's file.

@@ -59,9 +59,6 @@ void measure_error(SweepRow& row, const fs::path& directory, const SweepJob& ref
   }
 }
 
-// ---- rendering
-// -----------------------------------------------------------------------------------
-
 constexpr const char* kColumns[] = {
     "ms per step [95 % interval]",        "iterations per step", "worst gradient",
     "worst estimated error (mean edges)", "converged steps",     "exit code"};
@@ -127,12 +124,7 @@ std::string notes(const SweepTable& table) {
 
 std::string environment_list(const std::string& environment_json) {
   if (environment_json.empty()) return "";
-  std::string text = "\n## Environment\n\n";
-  const Json environment = Json::parse(environment_json);
-  for (const auto& [key, value] : environment.items())
-    text +=
-        fmt::format("- {}: {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
-  return text;
+  return "\n## Environment\n\n" + list_of(environment_json);
 }
 
 /// A field of RFC 4180.
@@ -141,11 +133,6 @@ std::string csv_field(const std::string& text) {
   std::string field = "\"";
   for (const char c : text) field += c == '"' ? std::string("\"\"") : std::string(1, c);
   return field + "\"";
-}
-
-/// Empty if there is no such number.
-std::string csv_number(double value) {
-  return std::isfinite(value) ? fmt::format("{:.9g}", value) : "";
 }
 
 Json error_json(const SweepRow& row) {
