@@ -22,6 +22,8 @@ STYLES = {
     "vanilla_pd": ("PD, CHOLMOD", "#222222", ""),
     "newton": ("Newton, CHOLMOD", "#A0527F", "8 4"),
     "newton_pcg": ("Newton, PCG", "#C98BB0", "3 3"),
+    "pd_jacobi": ("PD-Jacobi, Chebyshev", "#7A7A2A", "8 3 2 3"),
+    "xpbd": ("XPBD", "#999999", "2 3"),
 }
 OTHER_STYLE = ("", "#B8B8B8", "")
 PAPER_DX = 1e-3  # ||dx||_2 in the unit box, the paper's stop

@@ -10,7 +10,7 @@ DISTURBED_ABOVE = 1.1  # slowest run over fastest: more than 5 % of variation
 OURS = "default"
 # The baseline first, then from what many would write to ours; Newton's method is of another kind.
 ORDER = ("vanilla_pd", "pd_tree", "chebyshev", "anderson", "lbfgs", "default", "newton",
-         "newton_pcg")
+         "newton_pcg", "pd_jacobi", "xpbd")
 CLOTHS = ("soft", "cotton", "stiff")
 FAMILIES = ("convergence", "fig21")
 
