@@ -22,12 +22,14 @@ bool all_finite(const Positions& x) {
 }  // namespace
 
 Integrator::Integrator(const ClothModel& model, ExternalForces forces, std::vector<Pin> pins,
-                       IntegratorOptions options, std::unique_ptr<Minimizer> minimizer)
+                       IntegratorOptions options, std::unique_ptr<Minimizer> minimizer,
+                       std::unique_ptr<ContactTerms> contact)
     : model_(model),
       forces_(model, std::move(forces)),
       pins_(std::move(pins), model.start),
       options_(options),
-      minimizer_(std::move(minimizer)) {}
+      minimizer_(std::move(minimizer)),
+      contact_(std::move(contact)) {}
 
 void Integrator::prepare(const State& state) {
   minimizer_->prepare(held_at((state.step + 1) * options_.h));
@@ -90,11 +92,13 @@ StepReport Integrator::step(State& state) {
   double misc = phase.lap();
 
   StepProblem problem{&predicted_, &fixed, &state.x, extrapolate ? &extrapolated_ : nullptr,
-                      &memory,     {}};
+                      &memory,     {},      nullptr};
   if (iteration_observer_)
     problem.observer = [&](const StepReport& report, const Positions& x) {
       return iteration_observer_(state.step + 1, report, x);
     };
+  problem.contact = contact_.get();
+  if (contact_) contact_->begin_step(problem, state.time, end);
   if (observer_) observer_(problem);
   StepReport report = minimizer_->minimize(problem, x_);
 
@@ -105,6 +109,10 @@ StepReport Integrator::step(State& state) {
                     "use a smaller h or softer material",
                     state.step + 1, report.energy));
   model_.sewing.follow(end, x_);  // to the last bit
+  if (contact_) {
+    contact_->end_step(x_);
+    report.contact = contact_->report();
+  }
   if (minimizer_->wants_extrapolation()) state.previous_v = state.v;
   state.memory = std::move(memory);
   const double keep = options_.damping ? std::exp(-*options_.damping * h) : 1.0;

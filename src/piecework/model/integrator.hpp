@@ -28,7 +28,8 @@ class Integrator {
  public:
   /// \param model  must outlive the integrator.
   Integrator(const ClothModel& model, ExternalForces forces, std::vector<Pin> pins,
-             IntegratorOptions options, std::unique_ptr<Minimizer> minimizer);
+             IntegratorOptions options, std::unique_ptr<Minimizer> minimizer,
+             std::unique_ptr<ContactTerms> contact = nullptr);
 
   /// Set-up for the step after `state`, so that it is like the others. Optional.
   /// \throws SimulationError as Minimizer::prepare().
@@ -66,6 +67,7 @@ class Integrator {
   PinScript pins_;
   IntegratorOptions options_;
   std::unique_ptr<Minimizer> minimizer_;
+  std::unique_ptr<ContactTerms> contact_;  ///< null: nothing can touch
   std::function<void(const StepProblem&)> observer_;
   std::function<bool(int, const StepReport&, const Positions&)> iteration_observer_;
   Positions acceleration_, predicted_, extrapolated_, x_;

@@ -3,10 +3,12 @@
 // What every time stepper shares: the state, the step's data and its report.
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <piecework/core/types.hpp>
+#include <piecework/model/contact_terms.hpp>
 
 namespace piecework::model {
 
@@ -54,6 +56,7 @@ struct StepReport {
   int normal_factors = 0;  ///< factorisations of the metric's normal part
   bool stalled = false;    ///< ended before the stop rule held: rounding allows no more progress
   int degenerate_projections = 0;  ///< triangles that needed the rank-deficient rule
+  std::optional<ContactReport> contact;  ///< absent: nothing can touch
   PhaseTimes phases;
   double step_ms = 0;
 };
@@ -79,6 +82,7 @@ struct StepProblem {
   /// State::memory, to be read and renewed; null: none is kept.
   std::vector<double>* memory = nullptr;
   IterationObserver observer;  ///< usually empty
+  ContactTerms* contact = nullptr;  ///< null: nothing can touch
 
   /// False: the observer has seen enough.
   [[nodiscard]] bool observe(const StepReport& report, const Positions& x) const {

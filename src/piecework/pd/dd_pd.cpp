@@ -103,8 +103,9 @@ void DdPd::evaluate(Point& point, const model::StepProblem& problem, model::Step
   const Stopwatch watch;
   if (sweeps_) sweeps_->sweep(point.x, problem, report.iterations);
   const auto result = local_.evaluate(point.x, problem, gradient_);
-  metric_.reduction().gather(gradient_, point.g);
   point.energy = result.energy;
+  if (contact_) point.energy += contact_->evaluate(point.x, gradient_);
+  metric_.reduction().gather(gradient_, point.g);
   point.degenerate = result.degenerate;
   ++report.evaluations;
   report.phases.local += watch.elapsed_ms();
@@ -113,16 +114,25 @@ void DdPd::evaluate(Point& point, const model::StepProblem& problem, model::Step
 void DdPd::choose_start(const model::StepProblem& problem, const Positions& predicted,
                         model::StepReport& report) {
   now_.x = predicted;
+  const double held = contact_ ? contact_->start(now_.x) : 1.0;
   evaluate(now_, problem, report);
-  if (!problem.extrapolated) return;
+  if (!problem.extrapolated || held < 1) return;
   trial_.x = *problem.extrapolated;
+  if (contact_ && contact_->start(trial_.x) < 1) return contact_->hold_at(held);
   evaluate(trial_, problem, report);
-  if (trial_.energy < now_.energy) std::swap(now_, trial_);
+  if (trial_.energy < now_.energy)
+    std::swap(now_, trial_);
+  else if (contact_)
+    evaluate(now_, problem, report);  // contact speaks of its last evaluation
 }
 
 void DdPd::refresh_normals(model::StepReport& report) {
   const Stopwatch watch;
-  metric_.refresh_normals(now_.x);
+  const model::ContactTerms* contact = contact_ && contact_->touching() ? contact_ : nullptr;
+  if (options_.normals != NormalPart::Never)
+    metric_.refresh_normals(now_.x, contact);
+  else if (contact)
+    metric_.refresh_contact(*contact);
   acceleration_->metric_changed();
   ++report.normal_factors;
   last_refresh_ = report.iterations;
@@ -131,7 +141,8 @@ void DdPd::refresh_normals(model::StepReport& report) {
 }
 
 void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport& report) {
-  if (options_.normals == NormalPart::Never) return;
+  const bool touching = contact_ && contact_->touching();
+  if (options_.normals == NormalPart::Never && !touching) return;
   const bool doubtful = convergence_.reached(report) && !believable(report);
   if (report.normal_factors > 0) {
     if (report.iterations >= last_refresh_ + kIterationsPerRefresh ||
@@ -139,7 +150,8 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
       refresh_normals(report);
     return;
   }
-  const bool at_once = options_.normals == NormalPart::Always || starts_with_normals(memory);
+  const bool at_once =
+      touching || options_.normals == NormalPart::Always || starts_with_normals(memory);
   const bool later = report.iterations >= kPlainIterations &&
                      convergence_.expected_iterations(report) > kIterationsPerFactor;
   if (at_once || later || doubtful) refresh_normals(report);
@@ -163,31 +175,31 @@ bool DdPd::believable(const model::StepReport& report) const {
          report.iterations >= last_refresh_ + kIterationsToBelieve && convergence_.surely_holds();
 }
 
-bool DdPd::is_acceptable(double step, double slope) {
+bool DdPd::is_acceptable(double slope, const Positions& moved, double scale) {
   if (options_.sweeps && options_.sweeps->form == local::SweepForm::LiteralEq12)
     return std::isfinite(trial_.energy);
   const double rounding = kEnergyRounding * std::abs(now_.energy);
   if (trial_.energy < now_.energy - rounding) without_progress_ = 0;
-  if (trial_.energy <= now_.energy + kArmijo * step * slope) return true;
+  if (trial_.energy <= now_.energy + kArmijo * slope) return true;
   // Where energies differ by rounding only, the slopes still tell.
   return trial_.energy <= now_.energy + rounding &&
-         std::abs(dot(trial_.g, d_)) <= (1 - 2 * kArmijo) * -slope;
+         std::abs(scale * dot(trial_.g, moved)) <= (1 - 2 * kArmijo) * -slope;
 }
 
-void DdPd::accept(double step, model::StepReport& report) {
-  if (sweeps_) {
-    const model::Reduction& reduction = metric_.reduction();
-    moved_.resize(d_.rows(), 3);
-    parallel_for(static_cast<std::size_t>(d_.rows()), [&](std::size_t i) {
-      const int v = reduction.vertex(static_cast<int>(i));
-      moved_.row(static_cast<Eigen::Index>(i)) = trial_.x.row(v) - now_.x.row(v);
-    });
-  }
-  const Positions& moved = sweeps_ ? moved_ : d_;
-  const double scale = sweeps_ ? 1.0 : step;
+void DdPd::find_moved() {
+  const model::Reduction& reduction = metric_.reduction();
+  moved_.resize(d_.rows(), 3);
+  parallel_for(static_cast<std::size_t>(d_.rows()), [&](std::size_t i) {
+    const int v = reduction.vertex(static_cast<int>(i));
+    moved_.row(static_cast<Eigen::Index>(i)) = trial_.x.row(v) - now_.x.row(v);
+  });
+}
+
+void DdPd::accept(const Positions& moved, double scale, double step, model::StepReport& report) {
   acceleration_->accept(scale, moved, now_.g, trial_.g);
   convergence_.assume_stiffness_ratio(metric_.normals_in_use() ? 1.0 : stiffness_ratio_);
-  convergence_.measure_increment(moved, scale, report);
+  // What contact cut off is still to be done.
+  convergence_.measure_increment(sweeps_ ? moved : d_, sweeps_ ? scale : step, report);
   std::swap(now_, trial_);
 }
 
@@ -196,9 +208,14 @@ bool DdPd::line_search(const model::StepProblem& problem, double slope, model::S
   double step = 1;
   for (int k = 0; k < (may_shorten ? kMaxBacktracks : 1); ++k) {
     metric_.reduction().advance(now_.x, step, d_, trial_.x);
+    const bool cut = contact_ && contact_->limit(now_.x, trial_.x);
     evaluate(trial_, problem, report);
-    if (is_acceptable(step, slope)) {
-      accept(step, report);
+    const bool other_way = sweeps_ || cut;
+    if (other_way) find_moved();
+    const Positions& moved = other_way ? moved_ : d_;
+    const double scale = other_way ? 1.0 : step;
+    if (is_acceptable(cut ? dot(now_.g, moved_) : step * slope, moved, scale)) {
+      accept(moved, scale, step, report);
       return true;
     }
     // The minimum of the parabola through both slopes, kept within reason.
@@ -206,6 +223,13 @@ bool DdPd::line_search(const model::StepProblem& problem, double slope, model::S
     step = std::isfinite(wanted) ? std::clamp(wanted, 0.1 * step, 0.5 * step) : 0.1 * step;
   }
   return false;
+}
+
+/// Pins and obstacles that cloth barred go on.
+void DdPd::advance_held(const model::StepProblem& problem, model::StepReport& report) {
+  if (!contact_ || !contact_->advance_held(now_.x)) return;
+  evaluate(now_, problem, report);
+  acceleration_->restart();
 }
 
 /// One iteration; false if no direction leads down any more.
@@ -241,6 +265,7 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   convergence_.begin();
   acceleration_->restart();
   metric_.drop_normals();
+  contact_ = problem.contact;
   choose_start(problem, x, report);
   convergence_.measure_gradient(now_.g, report);
   report.energy = now_.energy;
@@ -249,6 +274,7 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   double best_gradient = report.gradient;
   while (go_on && report.iterations < options_.stop.max_iterations && !report.converged &&
          !report.stalled) {
+    advance_held(problem, report);
     consider_normals(problem.memory, report);
     if (!move(problem, report)) {
       convergence_.measure_refused(d_, report);

@@ -68,16 +68,20 @@ class DdPd final : public model::Minimizer {
   void choose_start(const model::StepProblem& problem, const Positions& predicted,
                     model::StepReport& report);
   bool move(const model::StepProblem& problem, model::StepReport& report);
-  [[nodiscard]] bool is_acceptable(double step, double slope);
-  /// now_ <- trial_ = now_ + step d_.
-  void accept(double step, model::StepReport& report);
+  /// \param slope  grad E times `moved`, the way from now_ to trial_
+  [[nodiscard]] bool is_acceptable(double slope, const Positions& moved, double scale);
+  /// now_ <- trial_; the way there was scale times `moved`, the way wanted step d_.
+  void accept(const Positions& moved, double scale, double step, model::StepReport& report);
   bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
+  void find_moved();
+  void advance_held(const model::StepProblem& problem, model::StepReport& report);
   [[nodiscard]] bool normals_are_outdated(const model::StepReport& report) const;
   [[nodiscard]] bool believable(const model::StepReport& report) const;
 
   const model::ClothModel& model_;
+  model::ContactTerms* contact_ = nullptr;  ///< of the step
   DdPdOptions options_;
   model::Convergence convergence_;
   double stiffness_ratio_ = 1;
@@ -87,7 +91,7 @@ class DdPd final : public model::Minimizer {
   local::JacobiStep local_;
   const decomposition::Decomposition* domains_;
   std::unique_ptr<local::GaussSeidel> sweeps_;
-  Positions moved_;       ///< n_f x 3: displacement with the sweep
+  Positions moved_;       ///< n_f x 3: displacement with the sweep, or as far as contact lets it
   int last_refresh_ = 0;  ///< iteration of the step
   double gradient_at_refresh_ = 0;
   int without_progress_ = 0;  ///< iterations

@@ -1,5 +1,6 @@
 #include <piecework/pd/metric.hpp>
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -24,6 +25,9 @@ double dynamic_range(const SparseMatrix& K) {
   return least > 0 ? K.diagonal().maxCoeff() / least : std::numeric_limits<double>::infinity();
 }
 
+/// K~ + D is factored where contact is stiffer than this fraction of K~'s diagonal.
+constexpr double kWorthFactoring = 0.1;
+
 /// A metric only shapes the path to the minimum: 32 bits do, and their error is not estimated.
 global::TreeOptions normal_options(const SparseMatrix& K) {
   if (dynamic_range(K) > kMostOf32Bits) return {};
@@ -37,12 +41,13 @@ Metric::Metric(const model::ClothModel& model, SparseMatrix K,
     : model_(model),
       K_(std::move(K)),
       solver_(std::move(solver)),
-      normal_solver_(normal_options(K_)) {}
+      normal_solver_(normal_options(K_)),
+      contact_solver_(normal_options(K_)) {}
 
 Metric::~Metric() = default;
 
 void Metric::prepare(const std::vector<char>& fixed) {
-  normals_in_use_ = false;
+  normals_in_use_ = contact_in_use_ = contact_analysed_ = false;
   normal_.reset();
   reduction_ = model::Reduction(model_, fixed);
   reduced_ = reduction_.system(K_);
@@ -50,7 +55,68 @@ void Metric::prepare(const std::vector<char>& fixed) {
   global::require_factor(status, reduction_.count());
 }
 
-bool Metric::refresh_normals(const Positions& x) {
+global::TreeSolver* Metric::stretch_tree() {
+  return contact_in_use_ ? &contact_solver_ : solver_->tree();
+}
+
+/// Of unknowns, from what contact says of vertices.
+void Metric::find_contact(const model::ContactTerms& contact) {
+  const auto count = static_cast<std::size_t>(model_.num_vertices());
+  vertex_normals_.setZero(model_.num_vertices(), 3);
+  if (normal_) {
+    parallel_for(count, [&](std::size_t v) {
+      Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+      model_.sewing.map().visit_carriers(static_cast<int>(v), [&](int carrier, double weight) {
+        const int unknown = reduction_.number(carrier);
+        if (unknown >= 0) sum += weight * normal_->normals().row(unknown);
+      });
+      const double length = sum.norm();
+      if (length > 0) vertex_normals_.row(static_cast<Eigen::Index>(v)) = sum / length;
+    });
+  }
+  contact.stiffness(vertex_normals_, contact_);
+  // |sum_c w_c u_c|^2 <= sum_c w_c |u_c|^2: what holds a slave holds its carriers by their weights.
+  Positions packed(model_.num_vertices(), 3);
+  packed << contact_.along, contact_.across, Eigen::VectorXd::Zero(model_.num_vertices());
+  along_.resize(reduction_.count());
+  across_.resize(reduction_.count());
+  parallel_for(static_cast<std::size_t>(reduction_.count()), [&](std::size_t i) {
+    const Eigen::RowVector3d sum = reduction_.row(packed, static_cast<int>(i));
+    along_[static_cast<Eigen::Index>(i)] = sum[0];
+    across_[static_cast<Eigen::Index>(i)] = sum[1];
+  });
+}
+
+bool Metric::factor_with(const Eigen::VectorXd& D) {
+  contact_in_use_ = false;
+  if (D.size() == 0 || !((D.array() > kWorthFactoring * reduced_.diagonal().array()).any()))
+    return true;
+  if (!contact_analysed_) {
+    if (const global::TreeSolver* tree = solver_->tree())
+      contact_solver_.share_analysis(*tree);
+    else
+      contact_solver_.analyze(global::pattern_of(reduced_));
+    contact_analysed_ = true;
+  }
+  contact_values_.assign(reduced_.valuePtr(), reduced_.valuePtr() + reduced_.nonZeros());
+  parallel_for(static_cast<std::size_t>(reduced_.cols()), [&](std::size_t column) {
+    const int* first = reduced_.innerIndexPtr() + reduced_.outerIndexPtr()[column];
+    const int* last = reduced_.innerIndexPtr() + reduced_.outerIndexPtr()[column + 1];
+    const int* entry = std::lower_bound(first, last, static_cast<int>(column));
+    contact_values_[static_cast<std::size_t>(entry - reduced_.innerIndexPtr())] +=
+        D[static_cast<Eigen::Index>(column)];
+  });
+  contact_in_use_ = contact_solver_.factor(contact_values_) == global::SolveStatus::Ok;
+  return contact_in_use_;
+}
+
+bool Metric::refresh_contact(const model::ContactTerms& contact) {
+  normals_in_use_ = false;
+  find_contact(contact);
+  return factor_with(along_ + across_);
+}
+
+bool Metric::refresh_normals(const Positions& x, const model::ContactTerms* contact) {
   if (!normal_) {
     normal_ = std::make_unique<NormalMatrix>(model_, reduction_, reduced_);
     if (global::TreeSolver* tree = solver_->tree())
@@ -58,12 +124,17 @@ bool Metric::refresh_normals(const Positions& x) {
     else
       normal_solver_.analyze(global::pattern_of(reduced_));
   }
-  normals_in_use_ = normal_solver_.factor(normal_->assemble(x)) == global::SolveStatus::Ok;
+  normal_->find_normals(x);
+  along_.resize(0);
+  across_.resize(0);
+  if (contact) find_contact(*contact);
+  factor_with(across_);
+  normals_in_use_ = normal_solver_.factor(normal_->assemble(x, along_)) == global::SolveStatus::Ok;
   return normals_in_use_;
 }
 
 void Metric::solve_stretch(const Positions& g, Positions& d) {
-  if (global::TreeSolver* tree = solver_->tree()) {
+  if (global::TreeSolver* tree = stretch_tree()) {
     (void)tree->solve(g.data(), d.data(), 3, 3, 1);
     return;
   }
@@ -73,23 +144,39 @@ void Metric::solve_stretch(const Positions& g, Positions& d) {
   d = columns_;
 }
 
+/// S: what touches has no say along its normal.
+void Metric::remove_normals(Positions& rows) const {
+  const auto N = normal_->normals();
+  parallel_for(static_cast<std::size_t>(rows.rows()), [&](std::size_t i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (along_[row] > 0) rows.row(row) -= N.row(row).dot(rows.row(row)) * N.row(row);
+  });
+}
+
 void Metric::apply(const Positions& g, Positions& d) {
   d.resize(g.rows(), 3);
   if (!normals_in_use_) return solve_stretch(g, d);
   const auto N = normal_->normals();
+  const bool touching = along_.size() > 0;
+  if (touching) {
+    tangential_ = g;
+    remove_normals(tangential_);
+  }
+  const Positions& across = touching ? tangential_ : g;
   const auto count = static_cast<std::size_t>(g.rows());
   along_normal_.resize(g.rows());
   parallel_for(count, [&](std::size_t i) {
     const auto row = static_cast<Eigen::Index>(i);
     along_normal_[row] = N.row(row).dot(g.row(row));
   });
-  if (global::TreeSolver* tree = solver_->tree()) {
-    (void)tree->solve_with(g.data(), d.data(), 3, normal_solver_, along_normal_.data(),
+  if (global::TreeSolver* tree = stretch_tree()) {
+    (void)tree->solve_with(across.data(), d.data(), 3, normal_solver_, along_normal_.data(),
                            along_normal_.data(), 1, 3, 1);
   } else {
-    solve_stretch(g, d);
+    solve_stretch(across, d);
     (void)normal_solver_.solve(along_normal_.data(), along_normal_.data(), 1, 1, 1);
   }
+  if (touching) remove_normals(d);
   parallel_for(count, [&](std::size_t i) {
     const auto row = static_cast<Eigen::Index>(i);
     d.row(row) += along_normal_[row] * N.row(row);

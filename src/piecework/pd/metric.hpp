@@ -1,12 +1,20 @@
 #pragma once
 
 // The metric in which the outer loop measures gradients: P = K~^-1, or K~^-1 + N Kn^-1 N^T.
+//
+// Contact stiffens single vertices, along their normals as a rule. A diagonal D in K would resist
+// sliding as much as pressing (the tangential locking of scalar contact weights, docs/contact.md).
+// So contact along normals joins Kn, K keeps what acts across (friction, contact from aside), and
+// for touching vertices K no longer speaks of normals:
+//     P = S (K~ + D_across)^-1 S + N (Kn + D_along)^-1 N^T,   S_v = I - n_v n_v^T where v touches.
+// Without normals all of it goes into K~ + D, as in [Lu25, Sec. 6].
 
 #include <memory>
 #include <optional>
 #include <string>
 
 #include <piecework/global/exact_solver.hpp>
+#include <piecework/model/contact_terms.hpp>
 #include <piecework/model/reduction.hpp>
 #include <piecework/pd/normal_matrix.hpp>
 
@@ -29,11 +37,15 @@ class Metric {
   [[nodiscard]] const global::ExactSolver& solver() const { return *solver_; }
 
   /// Adds the normal part with Kn at x (|V| x 3, m). False, and without it, if Kn could not be
+  /// factored. \param contact  as evaluated at x, or null
+  bool refresh_normals(const Positions& x, const model::ContactTerms* contact);
+
+  /// K~ with contact and without a normal part; false, and without contact, if that could not be
   /// factored.
-  bool refresh_normals(const Positions& x);
+  bool refresh_contact(const model::ContactTerms& contact);
 
   /// Back to P = K~^-1.
-  void drop_normals() { normals_in_use_ = false; }
+  void drop_normals() { normals_in_use_ = contact_in_use_ = false; }
   [[nodiscard]] bool normals_in_use() const { return normals_in_use_; }
 
   /// d = P g, both n_f x 3 (N -> m).
@@ -42,6 +54,12 @@ class Metric {
 
  private:
   void solve_stretch(const Positions& g, Positions& d);
+  void find_contact(const model::ContactTerms& contact);
+  /// Factors K~ + D, unless D is little beside it.
+  bool factor_with(const Eigen::VectorXd& D);
+  void remove_normals(Positions& rows) const;
+  /// The tree of K~, with D_across if there is any; null: the solver is no tree.
+  [[nodiscard]] global::TreeSolver* stretch_tree();
 
   const model::ClothModel& model_;
   SparseMatrix K_;
@@ -55,6 +73,15 @@ class Metric {
   global::TreeSolver normal_solver_;
   bool normals_in_use_ = false;
   Eigen::VectorXd along_normal_;  ///< N^T g, then Kn^-1 N^T g
+
+  // Contact; absent until anything touches.
+  model::ContactStiffness contact_;     ///< per vertex
+  Eigen::VectorXd along_, across_;      ///< per unknown, N/m
+  global::TreeSolver contact_solver_;   ///< of K~ + D
+  bool contact_analysed_ = false;
+  bool contact_in_use_ = false;
+  std::vector<double> contact_values_;  ///< of K~ + D
+  Positions vertex_normals_, tangential_;
 };
 
 }  // namespace piecework::pd

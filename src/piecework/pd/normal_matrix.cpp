@@ -55,7 +55,7 @@ struct NormalMatrix::Impl {
   void visit_pairs(const Visit& visit) const;
   void find_normals(const Positions& x);
   void fill_sewn(const SewnTriangle& sewn, const Positions& x);
-  void gather_column(std::size_t column);
+  void gather_column(std::size_t column, const Eigen::VectorXd& extra_diagonal);
 
   const model::ClothModel& model;
   const model::Reduction& reduction;
@@ -221,23 +221,29 @@ void NormalMatrix::Impl::fill_sewn(const SewnTriangle& s, const Positions& x) {
   }
 }
 
-void NormalMatrix::Impl::gather_column(std::size_t column) {
+void NormalMatrix::Impl::gather_column(std::size_t column,
+                                       const Eigen::VectorXd& extra_diagonal) {
   const auto c = static_cast<Eigen::Index>(column);
   const Eigen::RowVector3d n = normals.row(c);
   for (int e = K.outerIndexPtr()[column]; e < K.outerIndexPtr()[column + 1]; ++e) {
     const int row = K.innerIndexPtr()[e];
     if (row < c) continue;
     double value = K.valuePtr()[e];
-    if (row != c) value *= normals.row(row).dot(n);
+    if (row != c)
+      value *= normals.row(row).dot(n);
+    else if (extra_diagonal.size() > 0)
+      value += extra_diagonal[c];
     for (int k = entry_pairs.begin[at(e)]; k < entry_pairs.begin[at(e) + 1]; ++k)
       value -= pair_value[at(entry_pairs.item[at(k)])];
     values[at(e)] = value;
   }
 }
 
-std::span<const double> NormalMatrix::assemble(const Positions& x) {
+void NormalMatrix::find_normals(const Positions& x) { impl_->find_normals(x); }
+
+std::span<const double> NormalMatrix::assemble(const Positions& x,
+                                               const Eigen::VectorXd& extra_diagonal) {
   Impl& a = *impl_;
-  a.find_normals(x);
   constexpr std::size_t kBatches = 32;  // per task
   parallel_for((a.batches.size() + kBatches - 1) / kBatches,
                [&](std::size_t block) {
@@ -250,7 +256,7 @@ std::span<const double> NormalMatrix::assemble(const Positions& x) {
                1);
   parallel_for(a.sewn.size(), [&](std::size_t s) { a.fill_sewn(a.sewn[s], x); });
   parallel_for(static_cast<std::size_t>(a.reduction.count()),
-               [&](std::size_t column) { a.gather_column(column); });
+               [&](std::size_t column) { a.gather_column(column, extra_diagonal); });
   return a.values;
 }
 

@@ -31,11 +31,15 @@ class NormalMatrix {
                const SparseMatrix& K, Isa isa = best_isa());
   ~NormalMatrix();
 
-  /// Kn at x (|V| x 3, m), N/m: one value per entry of K~, those above the diagonal 0. Valid until
-  /// the next call. Fixed order of sums: the same bits for every number of threads.
-  std::span<const double> assemble(const Positions& x);
+  /// Turns N with the cloth at x (|V| x 3, m).
+  void find_normals(const Positions& x);
 
-  /// N of the last assemble(): n_f x 3, unit rows.
+  /// Kn at x with the N of find_normals() there, N/m: one value per entry of K~, those above the
+  /// diagonal 0. Valid until the next call. Fixed order of sums: the same bits for every number of
+  /// threads. \param extra_diagonal  n_f, N/m, or empty: what else resists along the normals
+  std::span<const double> assemble(const Positions& x, const Eigen::VectorXd& extra_diagonal = {});
+
+  /// N: n_f x 3, unit rows.
   [[nodiscard]] Eigen::Map<const Positions> normals() const;
 
  private:

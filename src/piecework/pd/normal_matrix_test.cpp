@@ -46,6 +46,7 @@ struct Assembled {
       : reduction(model, fixed),
         K(reduction.system(assemble_system(model, JoltedCloth::kH))),
         normal(model, reduction, K) {
+    normal.find_normals(x);
     const std::span<const double> values = normal.assemble(x);
     SparseMatrix lower = K;
     std::copy(values.begin(), values.end(), lower.valuePtr());
@@ -143,6 +144,7 @@ TEST(NormalMatrix, EveryInstructionSetAgrees) {
   const SparseMatrix K = reduction.system(assemble_system(cloth.model, JoltedCloth::kH));
   const auto assembled = [&](Isa isa) {
     NormalMatrix normal(cloth.model, reduction, K, isa);
+    normal.find_normals(x);
     const auto values = normal.assemble(x);
     return Eigen::VectorXd(
         Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
@@ -160,6 +162,7 @@ TEST(NormalMatrix, SameBitsForEveryThreadCount) {
   NormalMatrix normal(cloth.model, reduction, K);
   const auto run = [&](int threads) {
     return ThreadPool(threads).run([&] {
+      normal.find_normals(cloth.z);
       const auto values = normal.assemble(cloth.z);
       return std::vector<double>(values.begin(), values.end());
     });

@@ -1,12 +1,17 @@
 #include <piecework/runner/methods.hpp>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include <piecework/baselines/newton.hpp>
 #include <piecework/baselines/pd_jacobi.hpp>
 #include <piecework/baselines/vanilla_pd.hpp>
 #include <piecework/baselines/xpbd.hpp>
+#include <piecework/contact/contact.hpp>
+#include <piecework/core/error.hpp>
 #include <piecework/pd/dd_pd.hpp>
 #include <piecework/pd/primal_dual_step.hpp>
 
@@ -105,6 +110,25 @@ std::unique_ptr<model::Minimizer> make_dd_pd(const MethodContext& context) {
       make_exact_solver(context.world), &context.world.domains);
 }
 
+contact::Barrier barrier(const std::string& name) {
+  if (name == "none") return contact::Barrier::None;
+  if (name == "ipc") return contact::Barrier::Ipc;
+  if (name == "exponential") return contact::Barrier::Exponential;
+  return contact::Barrier::TwoStage;
+}
+
+/// \throws InputError if the mesh is too coarse a thing for it: neighbours would touch.
+double contact_distance(const World& world) {
+  const double mean_edge = world.model.mean_edge;
+  if (!world.scene.contact.distance) return std::min(1e-3, 0.25 * mean_edge);
+  const double distance = *world.scene.contact.distance;
+  if (distance <= 0.5 * mean_edge) return distance;
+  throw InputError(fmt::format(
+      "{}: /contact/distance: {:g} m is more than half of the mean edge length, {:g} m: neighbours "
+      "would touch each other; take less, or a coarser mesh",
+      world.scene.source, distance, mean_edge));
+}
+
 }  // namespace
 
 std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
@@ -136,11 +160,29 @@ std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
   return make_dd_pd(context);
 }
 
+std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
+  const scene::Scene& scene = world.scene;
+  if (!scene.self_collision) return nullptr;
+  contact::ContactOptions options;
+  options.h = scene.step.h;
+  options.self = scene.self_collision;
+  options.activation = {.barrier = barrier(scene.contact.barrier),
+                        .distance = contact_distance(world),
+                        .stiffness = scene.contact.stiffness.value_or(
+                            contact::default_stiffness(world.model, scene.step.h))};
+  options.friction = scene.friction;
+  options.slip_speed = scene.contact.slip_speed;
+  options.ccd.method =
+      scene.quality.ccd == "newton" ? collision::CcdMethod::Newton : collision::CcdMethod::Halley;
+  options.check = scene.contact.check;
+  return std::make_unique<contact::Contact>(world.model, options, contact::Obstacles{});
+}
+
 std::unique_ptr<model::Integrator> make_integrator(const World& world) {
   return std::make_unique<model::Integrator>(
       world.model, world.forces, world.pins,
       model::IntegratorOptions{.h = world.scene.step.h, .damping = world.scene.damping},
-      make_minimizer(world));
+      make_minimizer(world), make_contact(world));
 }
 
 }  // namespace piecework::runner

@@ -16,6 +16,9 @@ std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world);
 /// The method that the scene asks for. \pre `world` outlives it.
 std::unique_ptr<model::Minimizer> make_minimizer(const World& world);
 
+/// What the scene lets touch, or null. \pre `world` outlives it.
+std::unique_ptr<model::ContactTerms> make_contact(const World& world);
+
 /// The integrator that the scene asks for. \pre `world` outlives it.
 std::unique_ptr<model::Integrator> make_integrator(const World& world);
 

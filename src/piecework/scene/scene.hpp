@@ -155,9 +155,21 @@ struct Quality {
   std::string accelerate = "lbfgs_kn";
   int window = 5;                       ///< remembered iterates
   std::string precision = "automatic";  ///< "automatic" | "double" | "single"
+  std::string ccd = "halley";
   std::string preset = "default";  ///< which row of quality_presets() the other members start from
 
   bool operator==(const Quality&) const = default;
+};
+
+/// How things touch; matters only where something can (self_collision, colliders).
+struct Contact {
+  std::optional<double> distance;   ///< m; absent: from the mesh
+  std::optional<double> stiffness;  ///< N/m; absent: from the stiffness of the cloth
+  std::string barrier = "two_stage";
+  double slip_speed = 1e-3;  ///< m/s
+  bool check = true;
+
+  bool operator==(const Contact&) const = default;
 };
 
 struct Camera {
@@ -199,6 +211,9 @@ struct Scene {
       std::array<double, 3>{0, -9.81, 0};  ///< m/s^2; null: off
   std::optional<Wind> wind;
   std::optional<double> damping;  ///< velocity damping rate, 1/s; absent: off
+  bool self_collision = false;
+  std::optional<double> friction;  ///< coefficient; absent: none
+  Contact contact;
   Solver solver;
   Quality quality;
   std::map<std::string, Material> materials;

@@ -155,13 +155,13 @@ TEST(SceneErrors, Keys) {
           {with(R"("solver": { @"sphere": 4 })"),
            "/solver/sphere: unknown key \"sphere\"; did you mean "
            "\"cloths.0.pins.0.region.sphere\"?"},
-          {with(R"(@"friction": 0.4)"),
-           "/friction: unknown key \"friction\"; known keys here: name, description, step, "
+          {with(R"(@"humidity": 0.4)"),
+           "/humidity: unknown key \"humidity\"; known keys here: name, description, step, "
            "gravity, "
-           "wind, damping, solver, quality, materials, cloths, seams, camera, render, expect"},
+           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, camera, render, expect"},
           {with(R"(@"a/b~c": 0.4)"),
            "/a~1b~0c: unknown key \"a/b~c\"; known keys here: name, description, step, gravity, "
-           "wind, damping, solver, quality, materials, cloths, seams, camera, render, expect"},
+           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, camera, render, expect"},
           {R"(@{ "cloths": [] })",
            "/: \"materials\" is missing; add it: materials by name; cloths share them"},
           {with_cloth(R"(@{ "mesh": { "generator": "sheet" } })"),

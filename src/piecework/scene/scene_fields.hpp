@@ -482,6 +482,8 @@ void fields(V& v, Quality& q) {
              "32 bits: half the memory and nearly half the time; each global step, solved for the "
              "increment, is exact to about 4 digits. Where that is not enough for the matrix, 64 "
              "bits are used and the run says so"}});
+  v.choice({"ccd", "root finder of continuous collision detection; both are conservative"}, q.ccd,
+           {{"halley", "third order, the paper's"}, {"newton", "second order"}});
 }
 
 template <class V>
@@ -545,6 +547,34 @@ inline const Choices& quantities() {
 }
 
 template <class V>
+void fields(V& v, Contact& c) {
+  v.about("Contact",
+          "How cloth pushes off what it touches. Two surfaces closer than the contact distance "
+          "repel each other, and no step moves anything through anything.");
+  v.value({"distance",
+           "distance d at which contact begins, about the thickness of the cloth; absent: 1 mm, or "
+           "a quarter of the mean edge length where that is less. At most half of it",
+           "m"},
+          c.distance, above(0, 1e3));
+  v.value({"stiffness",
+           "stiffness of one contact at rest; absent: from the cloth. More of it means closer to "
+           "the contact distance, and harder steps",
+           "N/m"},
+          c.stiffness, above(0, 1e12));
+  v.choice({"barrier", "energy of a contact at distance x < d"}, c.barrier,
+           {{"two_stage", "stiffness / 2 (d - x)^2 down to d / 2, then a logarithm without end"},
+            {"ipc", "the logarithmic barrier of incremental potential contact"},
+            {"exponential", "an exponential, finite at x = 0"},
+            {"none", "stiffness / 2 (d - x)^2, the paper's: finite at x = 0"}});
+  v.value({"slip_speed", "below this speed friction is not yet fully developed", "m/s"},
+          c.slip_speed, above(0, 1e3));
+  v.value({"check",
+           "count edges that pass through triangles after every step, by a test that shares nothing "
+           "with what prevents them"},
+          c.check);
+}
+
+template <class V>
 void fields(V& v, Expectation& e) {
   v.about("Expectation", "What must be true of the run: min <= quantity <= max at a time.");
   v.choice(Key{"quantity", "what is measured"}.needed(), e.quantity, quantities());
@@ -574,6 +604,10 @@ void fields(V& v, Scene& s) {
   v.value(
       {"damping", "rate d at which velocities decay, by exp(-d h) per step; absent: off", "1/s"},
       s.damping, above(0, 1e6));
+  v.value({"self_collision", "cloth touches cloth, its own included"}, s.self_collision);
+  v.value({"friction", "coefficient of dry friction between what touches; absent: none"},
+          s.friction, above(0, 100));
+  v.object({"contact", "how things touch"}, s.contact);
   v.object({"solver", "how a step is solved"}, s.solver);
   v.object({"quality", "how accurately a step is solved"}, s.quality);
   v.map(Key{"materials", "materials by name; cloths share them"}.needed(), s.materials);

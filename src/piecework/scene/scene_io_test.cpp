@@ -34,7 +34,11 @@ constexpr const char* kEveryKey = R"({
               "domain_weights": [1, 1, 1, 0.5, 0.25],
               "threads": 3, "hessian": "unprojected", "linear": "pcg", "chebyshev_rho": 0.75 },
   "quality": { "stop": "dx_rms", "tolerance": 1e-3, "max_iterations": 11, "min_iterations": 2,
-               "accelerate": "anderson", "window": 7, "precision": "single", "preset": "reference" },
+               "accelerate": "anderson", "window": 7, "precision": "single", "ccd": "newton",
+               "preset": "reference" },
+  "self_collision": true, "friction": 0.5,
+  "contact": { "distance": 0.002, "stiffness": 100, "barrier": "ipc", "slip_speed": 0.01,
+               "check": false },
   "materials": { "m/1": { "density": 0.1, "stretching": 3e5, "thickness": 1e-3, "bending": 2e-6 },
                  "soft": { "density": 0.2 } },
   "cloths": [
@@ -120,7 +124,9 @@ Scene expected_every_key() {
   scene.solver = {"vanilla_pd", "primal_dual", "jacobi", 5, {1, 1, 1, 0.5, 0.25},
                   0.25,         "dense",       "dual",   3, "unprojected",
                   "pcg",        0.75};
-  scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single", "reference"};
+  scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single", "newton", "reference"};
+  scene.self_collision = true, scene.friction = 0.5;
+  scene.contact = {0.002, 100, "ipc", 0.01, false};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();
   scene.cloths = {expected_first_cloth(), expected_second_cloth()};

@@ -1,0 +1,109 @@
+#include <piecework/contact/near_pairs.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <piecework/core/parallel.hpp>
+
+namespace piecework::contact {
+namespace {
+
+constexpr std::size_t kPairsPerBlock = 2048;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+NearPairs::NearPairs(collision::Surface surface, double reach, double slack)
+    : broad_phase_(std::move(surface)), reach_(reach), slack_(slack) {}
+
+void NearPairs::begin() {
+  boxes_.clear();
+  made_at_.resize(0, 3);
+}
+
+bool NearPairs::contains(const Points& x) const {
+  if (boxes_.empty()) return false;
+  return parallel_max(boxes_.size(), [&](std::size_t v) {
+           const Vec3 p = x(static_cast<int>(v));
+           const bool inside =
+               (p.array() >= boxes_[v].low.array() && p.array() <= boxes_[v].high.array()).all();
+           return inside ? 0.0 : 1.0;
+         }) == 0;
+}
+
+bool NearPairs::cover(const Points& from, const Points& to) {
+  if (contains(from) && contains(to)) return false;
+  const bool first = boxes_.empty();
+  boxes_.resize(at(from.count()));
+  parallel_for(boxes_.size(), [&](std::size_t v) {
+    const Vec3 a = from(static_cast<int>(v)), b = to(static_cast<int>(v));
+    const Vec3 low = a.cwiseMin(b).array() - slack_, high = a.cwiseMax(b).array() + slack_;
+    boxes_[v].low = first ? low : low.cwiseMin(boxes_[v].low);
+    boxes_[v].high = first ? high : high.cwiseMax(boxes_[v].high);
+  });
+  list_candidates();
+  made_at_.resize(0, 3);
+  return true;
+}
+
+collision::PairVertices NearPairs::vertex_triangle(collision::PairIndex pair) const {
+  const Triangle& t = surface().triangles[at(pair.b)];
+  return {pair.a, t[0], t[1], t[2]};
+}
+
+collision::PairVertices NearPairs::edge_edge(collision::PairIndex pair) const {
+  const auto &a = surface().edges[at(pair.a)], &b = surface().edges[at(pair.b)];
+  return {a[0], a[1], b[0], b[1]};
+}
+
+void NearPairs::list_candidates() {
+  const collision::CandidatePairs& found = broad_phase_.find(boxes_, reach_);
+  const std::size_t vt = found.vertex_triangle.size();
+  candidates_.resize(vt + found.edge_edge.size());
+  parallel_for(candidates_.size(), [&](std::size_t i) {
+    using enum collision::PairKind;
+    candidates_[i] = i < vt
+                         ? NearPair{vertex_triangle(found.vertex_triangle[i]), VertexTriangle, 0}
+                         : NearPair{edge_edge(found.edge_edge[i - vt]), EdgeEdge, 0};
+  });
+}
+
+double NearPairs::moved(const Points& x) const {
+  return std::sqrt(parallel_max(at(x.count()), [&](std::size_t v) {
+    return (x(static_cast<int>(v)) - made_at_.row(static_cast<Eigen::Index>(v)).transpose())
+        .squaredNorm();
+  }));
+}
+
+bool NearPairs::valid_at(const Points& x) const {
+  return made_at_.rows() > 0 && moved(x) <= slack_;
+}
+
+std::span<const NearPair> NearPairs::near(const Points& x) {
+  if (valid_at(x)) return near_;
+  const double within = reach_ + 2 * slack_;
+  blocks_.resize((candidates_.size() + kPairsPerBlock - 1) / kPairsPerBlock);
+  parallel_for(
+      blocks_.size(),
+      [&](std::size_t block) {
+        blocks_[block].clear();
+        const std::size_t end = std::min(candidates_.size(), (block + 1) * kPairsPerBlock);
+        for (std::size_t i = block * kPairsPerBlock; i < end; ++i) {
+          NearPair& pair = candidates_[i];
+          pair.distance = std::sqrt(collision::closest(pair.kind, x(pair.vertices)).distance_sq);
+          if (pair.distance < within) blocks_[block].push_back(pair);
+        }
+      },
+      1);
+  near_.clear();
+  for (const auto& block : blocks_) near_.insert(near_.end(), block.begin(), block.end());
+  made_at_.resize(x.count(), 3);
+  parallel_for(at(x.count()), [&](std::size_t v) {
+    made_at_.row(static_cast<Eigen::Index>(v)) = x(static_cast<int>(v)).transpose();
+  });
+  return near_;
+}
+
+}  // namespace piecework::contact

@@ -1,0 +1,151 @@
+// How far a move may go: continuous collision detection, vertex by vertex.
+
+#include <algorithm>
+#include <cmath>
+
+#include <piecework/contact/contact.hpp>
+#include <piecework/core/clock.hpp>
+#include <piecework/core/parallel.hpp>
+#include <piecework/model/stepper.hpp>
+
+namespace piecework::contact {
+namespace {
+
+constexpr std::size_t kPairsPerBlock = 1024;
+/// Of the way to the first contact; the rest keeps a gap.
+constexpr double kApproach = 0.8;
+/// Rounds in which only those vertices are shortened that would hit; then all of them.
+constexpr int kLocalRounds = 8;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// Upper bound of how much closer a pair can have come: its motion without the mean of it.
+double closing_bound(collision::PairKind kind, const collision::PairPoints& a,
+                     const collision::PairPoints& b) {
+  const collision::PairPoints u{b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]};
+  const Vec3 mean = 0.25 * (u[0] + u[1] + u[2] + u[3]);
+  std::array<double, 4> s;
+  for (std::size_t i = 0; i < 4; ++i) s[i] = (u[i] - mean).norm();
+  return kind == collision::PairKind::VertexTriangle
+             ? s[0] + std::max({s[1], s[2], s[3]})
+             : std::max(s[0], s[1]) + std::max(s[2], s[3]);
+}
+
+}  // namespace
+
+void Contact::find_hits(std::span<const NearPair> pairs, double moved, const Points& from,
+                        const Points& to, bool first) {
+  hit_blocks_.resize((pairs.size() + kPairsPerBlock - 1) / kPairsPerBlock);
+  parallel_for(
+      hit_blocks_.size(),
+      [&](std::size_t block) {
+        hit_blocks_[block].clear();
+        const std::size_t end = std::min(pairs.size(), (block + 1) * kPairsPerBlock);
+        for (std::size_t i = block * kPairsPerBlock; i < end; ++i) {
+          const NearPair& pair = pairs[i];
+          const auto& v = pair.vertices;
+          if (!first && !changed_[at(v[0])] && !changed_[at(v[1])] && !changed_[at(v[2])] &&
+              !changed_[at(v[3])])
+            continue;
+          const collision::PairPoints a = from(v), b = to(v);
+          if (closing_bound(pair.kind, a, b) < pair.distance - 2 * moved) continue;
+          const collision::CcdResult result =
+              collision::first_contact(pair.kind, a, b, options_.ccd);
+          if (result.hit) hit_blocks_[block].push_back({i, result.time});
+        }
+      },
+      1);
+  hits_.clear();
+  for (const auto& block : hit_blocks_) hits_.insert(hits_.end(), block.begin(), block.end());
+}
+
+void Contact::lower_scale(int vertex, double part) {
+  if (is_held(vertex)) {
+    if (held_moves_) next_held_scale_ = std::min(next_held_scale_, held_scale_ * part);
+    return;
+  }
+  const auto lower = [&](int v) {
+    if (!is_held(v)) next_scale_[at(v)] = std::min(next_scale_[at(v)], scale_[at(v)] * part);
+  };
+  // What is sewn goes as far as what carries it.
+  if (model_.sewing.empty())
+    lower(vertex);
+  else
+    model_.sewing.map().visit_carriers(vertex, [&](int carrier, double) { lower(carrier); });
+}
+
+void Contact::take_scales() {
+  parallel_for(scale_.size(), [&](std::size_t v) {
+    const bool held = is_held(static_cast<int>(v));
+    changed_[v] = held ? next_held_scale_ != held_scale_ : next_scale_[v] != scale_[v];
+    scale_[v] = held ? next_held_scale_ : next_scale_[v];
+  });
+  held_scale_ = next_held_scale_;
+  if (model_.sewing.empty()) return;
+  for (int v = 0; v < model_.num_vertices(); ++v)
+    model_.sewing.map().visit_carriers(v, [&](int carrier, double) {
+      if (changed_[at(carrier)]) changed_[at(v)] = 1;
+    });
+}
+
+void Contact::go(const Points& from, Positions& to, Positions& obstacles) {
+  const auto n = at(model_.num_vertices());
+  parallel_for(scale_.size(), [&](std::size_t i) {
+    if (!changed_[i]) return;
+    const auto v = static_cast<Eigen::Index>(i);
+    const Vec3 end = from(static_cast<int>(i)) + scale_[i] * way_.row(v).transpose();
+    if (i < n)
+      to.row(v) = end.transpose();
+    else
+      obstacles.row(v - static_cast<Eigen::Index>(n)) = end.transpose();
+  });
+  model_.sewing.follow(end_time_, to);
+}
+
+double Contact::shorten(const Points& from, Positions& to, Positions& obstacles) {
+  Stopwatch watch;
+  // Obstacles that stay are both ends of the way at once: keep the first apart from the second.
+  const Points end{to, obstacles};
+  if (near_.cover(from, end)) report_.cull_ms += watch.lap();
+  (void)near_.near(from);
+  const double moved = near_.moved(from);
+  const std::span<const NearPair> pairs =
+      near_.valid_at(end) ? near_.near(from) : near_.candidates();
+  find_hits(pairs, moved, from, end, true);
+  held_scale_ = 1;
+  if (!hits_.empty()) {
+    ++report_.shortened;
+    way_.resize(from.count(), 3);
+    parallel_for(at(from.count()), [&](std::size_t v) {
+      way_.row(static_cast<Eigen::Index>(v)) =
+          (end(static_cast<int>(v)) - from(static_cast<int>(v))).transpose();
+    });
+    held_moves_ = parallel_max(at(from.count()), [&](std::size_t v) {
+                    const bool held = is_held(static_cast<int>(v));
+                    return held ? way_.row(static_cast<Eigen::Index>(v)).cwiseAbs().maxCoeff() : 0.0;
+                  }) > 0;
+    scale_.assign(at(from.count()), 1.0);
+    changed_.assign(at(from.count()), 0);
+  }
+  for (int round = 0; !hits_.empty(); ++round) {
+    next_scale_ = scale_;
+    next_held_scale_ = held_scale_;
+    if (round < kLocalRounds) {
+      for (const Hit& hit : hits_)
+        for (const int v : pairs[hit.pair].vertices) lower_scale(v, kApproach * hit.time);
+    } else {
+      double least = 1;
+      for (const Hit& hit : hits_) least = std::min(least, hit.time);
+      for (double& scale : next_scale_) scale *= kApproach * least;
+      next_held_scale_ *= kApproach * least;
+    }
+    take_scales();
+    go(from, to, obstacles);
+    if (round >= kLocalRounds) break;
+    find_hits(pairs, moved, from, end, false);
+  }
+  report_.narrow_ms += watch.lap();
+  return held_scale_;
+}
+
+}  // namespace piecework::contact

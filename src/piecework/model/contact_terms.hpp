@@ -1,0 +1,73 @@
+#pragma once
+
+// What minimisers know of contact: its part of the incremental potential, and how far a step may go.
+
+#include <piecework/core/types.hpp>
+
+namespace piecework::model {
+
+struct StepProblem;
+
+/// How stiffly contact holds each vertex, an upper bound by vertex, N/m.
+struct ContactStiffness {
+  Eigen::VectorXd along;   ///< |V|: in the direction of the vertex' normal
+  Eigen::VectorXd across;  ///< |V|: in the others: friction, and contact from aside
+};
+
+/// Counts and times of one step; what did not run is negative.
+struct ContactReport {
+  int pairs = 0;              ///< closer than the contact distance at the end of the step
+  int candidates = 0;         ///< pairs that the broad phase proposed last
+  int shortened = 0;          ///< moves that would have passed through something
+  int interpenetrations = 0;  ///< edges that pass through triangles after the step
+  double held_back = 0;       ///< fraction of the motion of pins and obstacles that cloth barred
+  double cull_ms = 0;         ///< Cull: broad phase
+  double narrow_ms = 0;       ///< Nrw.: distances, forces, continuous detection
+  double check_ms = -1;       ///< the independent check for interpenetrations
+};
+
+/// Contact during one step: an energy E_c(x) that rises as things come closer than the contact
+/// distance, and a rule for moves that keeps them from passing through each other.
+class ContactTerms {
+ public:
+  virtual ~ContactTerms() = default;
+
+  /// A step from *problem.previous at time `begin` to `end`, s. \pre outlives the step
+  virtual void begin_step(const StepProblem& problem, double begin, double end) = 0;
+
+  /// Shortens the straight way from the start of the step to x, vertex by vertex, so that nothing
+  /// passes through anything; pins and obstacles move along. Returns the fraction of their way that
+  /// they could go: 1 as a rule, less where cloth is caught between them.
+  virtual double start(Positions& x) = 0;
+
+  /// Puts obstacles back to a fraction of their way that start() returned.
+  virtual void hold_at(double fraction) = 0;
+
+  /// Moves pins in x, and obstacles, on towards where the step wants them, as far as the cloth lets
+  /// them. False: nothing has moved.
+  virtual bool advance_held(Positions& x) = 0;
+
+  /// Shortens the straight way from -> to, both after start(), in the same way; what is held stays.
+  /// True if it had to. |V| x 3, m
+  virtual bool limit(const Positions& from, Positions& to) = 0;
+
+  /// Adds grad E_c to `gradient` (|V| x 3, N; nothing at held vertices); returns E_c, J.
+  virtual double evaluate(const Positions& x, Positions& gradient) = 0;
+
+  /// Takes the pressure that friction is proportional to from the last evaluate(). False: there is
+  /// no friction, and E_c is the same as before.
+  virtual bool renew_friction() = 0;
+
+  /// Of the last evaluate(). \param normals  |V| x 3, unit
+  virtual void stiffness(const Positions& normals, ContactStiffness& stiffness) const = 0;
+
+  /// Anything is closer than the contact distance, in the last evaluate().
+  [[nodiscard]] virtual bool touching() const = 0;
+
+  /// Counts what passes through what at the end of the step, x.
+  virtual void end_step(const Positions& x) = 0;
+
+  [[nodiscard]] virtual const ContactReport& report() const = 0;
+};
+
+}  // namespace piecework::model
