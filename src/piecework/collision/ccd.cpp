@@ -1,0 +1,251 @@
+#include <piecework/collision/ccd.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <piecework/core/error.hpp>
+#include <piecework/core/parallel.hpp>
+
+// Two facts carry the method.
+//
+// 1. Elements that touch are coplanar: the cubic f(t) = det(p, q, r) of three differences between
+//    their vertices is zero. Where |f| exceeds its rounding error there is no contact.
+// 2. Along any fixed axis n, the separation of the two convex elements is the smallest of the
+//    numbers n . (difference of two vertices), each linear in t, and is no larger than n times the
+//    distance. So an axis found in whatever way proves a whole interval free of contact.
+//
+// The cubic says where contact is possible at all, closest points supply good axes, and neither has
+// to be accurate for the answer to be safe.
+
+namespace piecework::collision {
+namespace {
+
+constexpr double kUnit = 0x1p-53;  // relative error of one rounding
+constexpr double kSmallest = 1e-45, kLargest = 1e45;  // squares of volumes neither under nor overflow
+constexpr int kMaxAxes = 256;
+constexpr int kMaxSteps = 24;  // of Halley or Newton before bisection takes over
+
+/// Differences between each vertex of the first element and each of the second, at both ends of
+/// the motion. Taken between given numbers, each has one rounding error, relative to itself; hence
+/// a common translation, however far, costs no accuracy.
+struct Motion {
+  PairKind kind;
+  int count;  ///< 3 for VT, 4 for EE
+  std::array<Vec3, 4> start, end;
+  double size;  ///< largest |coordinate| in them
+};
+
+int differences(PairKind kind, const PairPoints& x, std::array<Vec3, 4>& d) {
+  if (kind == PairKind::VertexTriangle) {
+    d = {x[0] - x[1], x[0] - x[2], x[0] - x[3], Vec3::Zero()};
+    return 3;
+  }
+  d = {x[0] - x[2], x[0] - x[3], x[1] - x[2], x[1] - x[3]};
+  return 4;
+}
+
+Motion relative_motion(PairKind kind, const PairPoints& start, const PairPoints& end) {
+  Motion m;
+  m.kind = kind;
+  m.count = differences(kind, start, m.start);
+  differences(kind, end, m.end);
+  double size = 0;
+  bool finite = true;
+  for (const auto* side : {&m.start, &m.end})
+    for (const Vec3& d : *side)
+      for (int k = 0; k < 3; ++k) {
+        size = std::max(size, std::abs(d[k]));
+        finite &= std::isfinite(d[k]);
+      }
+  m.size = finite ? size : std::numeric_limits<double>::infinity();
+  return m;
+}
+
+/// The pair at time t with its first vertex at the origin.
+PairPoints points_at(const Motion& m, double t) {
+  const auto d = [&](std::size_t k) -> Vec3 { return (1 - t) * m.start[k] + t * m.end[k]; };
+  if (m.kind == PairKind::VertexTriangle) return {Vec3::Zero(), -d(0), -d(1), -d(2)};
+  return {Vec3::Zero(), d(2) - d(0), -d(0), -d(1)};
+}
+
+/// The latest time up to which the axis proves, from t on, that the distance exceeds `separation`:
+/// t if it proves nothing, 1 if it proves all.
+double separated_until(const Motion& m, const Vec3& axis, double t, double separation) {
+  // A bound on |axis . difference|: the products and sums below err by less than 8 units of it.
+  const double reach = m.size * (std::abs(axis[0]) + std::abs(axis[1]) + std::abs(axis[2]));
+  if (!(reach > 1e-280)) return t;
+  double limit = 16 * kUnit * reach;
+  if (separation > 0) limit += (1 + 8 * kUnit) * separation * axis.norm();
+  double until = 1;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(m.count); ++k) {
+    const double a = axis.dot(m.start[k]), b = axis.dot(m.end[k]);
+    if (!((1 - t) * a + t * b > limit)) return t;
+    if (b <= limit) until = std::min(until, (1 - 8 * kUnit) * ((a - limit) / (a - b)));
+  }
+  return std::max(until, t);
+}
+
+/// c[0] + c[1] t + c[2] t^2 + c[3] t^3.
+struct Cubic {
+  std::array<double, 4> c;
+  double operator()(double t) const { return ((c[3] * t + c[2]) * t + c[1]) * t + c[0]; }
+  [[nodiscard]] double slope(double t) const { return (3 * c[3] * t + 2 * c[2]) * t + c[1]; }
+  [[nodiscard]] double curvature(double t) const { return 6 * c[3] * t + 2 * c[2]; }
+};
+
+struct Coplanarity {
+  Cubic f;
+  double error;  ///< |f| above this is not zero in exact arithmetic
+  bool never;    ///< f has no zero in [0, 1]
+};
+
+Coplanarity coplanarity(const Motion& m) {
+  const auto& [p0, q0, r0, s0] = m.start;
+  const auto& [p1, q1, r1, s1] = m.end;
+  const Vec3 n00 = q0.cross(r0), n11 = q1.cross(r1), n01 = q0.cross(r1) + q1.cross(r0);
+  // Bernstein coefficients, the inner two times 3.
+  const double b0 = p0.dot(n00), b1 = p1.dot(n00) + p0.dot(n01);
+  const double b2 = p1.dot(n01) + p0.dot(n11), b3 = p1.dot(n11);
+  // A coefficient is a mean of determinants, 6 products of three factors each, every product with
+  // at most 12 roundings: less than 80 units of size^3.
+  const double error = 80 * kUnit * m.size * m.size * m.size;
+  const double low = std::min(std::min(b0, b3), std::min(b1, b2) / 3);
+  const double high = std::max(std::max(b0, b3), std::max(b1, b2) / 3);
+  if (low > error || high < -error) return {{}, error, true};
+  // Conversion to powers and Horner's rule: less than 256 units of the largest coefficient. The
+  // other half of 512 covers what rounding of the critical points leaves of monotonicity.
+  return {{{b0, b1 - 3 * b0, b2 - 2 * b1 + 3 * b0, b3 - b2 + b1 - b0}},
+          error + 512 * kUnit * std::max(high, -low),
+          false};
+}
+
+/// Step of the root finder from t, where f has the given value; not finite where it has none.
+double root_step(const Cubic& f, double t, double value, CcdMethod method) {
+  const double slope = f.slope(t);
+  if (method == CcdMethod::Newton) return -value / slope;
+  return -2 * value * slope / (2 * slope * slope - value * f.curvature(t));
+}
+
+/// f is monotone in [low, high] with f(low) > 0 >= f(high). The left end, f > 0, of a bracket no
+/// wider than the tolerance.
+double last_above_zero(const Cubic& f, double low, double high, const CcdOptions& options,
+                       double tolerance, int& evaluations) {
+  const double at_low = f(low), at_high = f(high);
+  double t = low + (high - low) * (at_low / (at_low - at_high));
+  for (int step = 0;; ++step) {
+    if (!(low < t && t < high) || step > kMaxSteps) t = 0.5 * (low + high);
+    const double value = f(t);
+    ++evaluations;
+    (value > 0 ? low : high) = t;
+    if (high - low <= tolerance) return low;
+    const double move = root_step(f, t, value, options.method);
+    // Once it has converged, a step to beyond the root closes the bracket from the other side.
+    if (std::abs(move) < 0.5 * tolerance)
+      t += value > 0 ? 0.9 * tolerance : -0.9 * tolerance;
+    else
+      t += move;
+  }
+}
+
+/// Ends of the pieces of [0, 1] in which f is monotone.
+struct Pieces {
+  std::array<double, 4> ends;
+  std::size_t count;  ///< of pieces, 1 to 3
+};
+
+Pieces monotone_pieces(const Cubic& f) {
+  Pieces p{{0, 1, 1, 1}, 1};
+  const double a = 3 * f.c[3], b = f.c[2], c = f.c[1];  // f' = a t^2 + 2 b t + c
+  const double discriminant = b * b - a * c;
+  if (!(discriminant > 0)) return p;
+  const double q = -(b + std::copysign(std::sqrt(discriminant), b));
+  const double first = std::min(q / a, c / q), second = std::max(q / a, c / q);
+  for (const double t : {first, second})
+    if (t > 0 && t < 1) p.ends[p.count++] = t;
+  p.ends[p.count] = 1;
+  return p;
+}
+
+class Search {
+ public:
+  Search(const Motion& motion, const CcdOptions& options)
+      : motion_(motion), options_(options), tolerance_(std::max(1e-14, options.tolerance)) {}
+
+  /// Advances from `from` to `to`, axis by axis; stops early where `left(t)`, which says that
+  /// contact has become impossible again. True when it cannot go on: a hit.
+  template <class Left>
+  bool meets(double from, double to, const Left& left) {
+    double t = from;
+    for (int axes = 0; axes < kMaxAxes; ++axes) {
+      const double until = advance(t);
+      if (until >= to) return false;
+      if (until <= t + tolerance_) break;
+      t = until;
+      result_.additive = true;
+      if (left(t)) return false;
+    }
+    result_.hit = true;
+    result_.time = t;
+    return true;
+  }
+
+  /// Contact in the part of the monotone piece [low, high] in which f may be zero.
+  bool meets_when_coplanar(const Coplanarity& plane, double low, double high) {
+    const double at_low = plane.f(low), at_high = plane.f(high);
+    result_.evaluations += 2;
+    const double sign = at_low < 0 ? -1 : 1;
+    if (sign * at_low > plane.error) {
+      if (sign * at_high > plane.error) return false;
+      Cubic above = plane.f;
+      for (double& c : above.c) c *= sign;
+      above.c[0] -= plane.error;
+      low = last_above_zero(above, low, high, options_, tolerance_, result_.evaluations);
+    }
+    return meets(low, high, [&](double t) { return std::abs(plane.f(t)) > plane.error; });
+  }
+
+  [[nodiscard]] const CcdResult& result() const { return result_; }
+
+ private:
+  double advance(double t) {
+    ++result_.evaluations;
+    const Closest c = closest(motion_.kind, points_at(motion_, t));
+    return separated_until(motion_, c.offset, t, options_.min_separation);
+  }
+
+  const Motion& motion_;
+  const CcdOptions& options_;
+  double tolerance_;
+  CcdResult result_;
+};
+
+}  // namespace
+
+CcdResult first_contact(PairKind kind, const PairPoints& start, const PairPoints& end,
+                        const CcdOptions& options) {
+  const Motion motion = relative_motion(kind, start, end);
+  if (!(motion.size > kSmallest && motion.size < kLargest)) return {.hit = true, .time = 0};
+  Search search(motion, options);
+  if (options.min_separation > 0 || options.method == CcdMethod::Additive) {
+    search.meets(0, 1, [](double) { return false; });
+    return search.result();
+  }
+  const Coplanarity plane = coplanarity(motion);
+  if (plane.never) return {.evaluations = 1};
+  const Pieces pieces = monotone_pieces(plane.f);
+  for (std::size_t i = 0; i < pieces.count; ++i)
+    if (search.meets_when_coplanar(plane, pieces.ends[i], pieces.ends[i + 1])) break;
+  return search.result();
+}
+
+void first_contacts(std::span<const CcdQuery> queries, const CcdOptions& options,
+                    std::span<CcdResult> results) {
+  PIECEWORK_ASSERT(queries.size() == results.size());
+  parallel_for(queries.size(), [&](std::size_t i) {
+    const CcdQuery& q = queries[i];
+    results[i] = first_contact(q.kind, q.start, q.end, options);
+  });
+}
+
+}  // namespace piecework::collision
