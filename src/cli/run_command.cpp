@@ -36,6 +36,7 @@ struct RunArguments {
   bool no_images = false;
   bool no_state = false;
   bool log_iterations = false;
+  bool strict = false;
   bool fast_images = false;
   std::vector<std::string> exports;
   int checkpoint_every = 0;
@@ -142,6 +143,15 @@ void report_convergence(const runner::RunOutcome& outcome) {
         quality.tolerance);
 }
 
+/// Says what passed through what; false if strictness forbids it.
+bool report_interpenetrations(const runner::RunOutcome& outcome, bool strict) {
+  const int worst = runner::totals(outcome.record.frames).interpenetrations;
+  if (worst > 0)
+    say("{}: up to {} edges pass through triangles after a step (run.json says when)\n",
+        strict ? "interpenetration" : "note", worst);
+  return worst == 0 || !strict;
+}
+
 int report(const runner::RunOutcome& outcome, const RunArguments& arguments) {
   for (const auto& e : outcome.record.expectations)
     if (e.reached && !e.holds)
@@ -153,6 +163,8 @@ int report(const runner::RunOutcome& outcome, const RunArguments& arguments) {
     return 128 + stop_signal();
   }
   fmt::print("{}\n", (std::filesystem::path(arguments.directory) / "summary.md").string());
+  if (!report_interpenetrations(outcome, arguments.strict))
+    return static_cast<int>(ExitCode::SimulationFailed);
   return static_cast<int>(arguments.expect && !outcome.expectations_hold() ? ExitCode::CheckFailed
                                                                            : ExitCode::Ok);
 }
@@ -205,6 +217,8 @@ void add_run(CLI::App& program, Action& action, const Verbosity& verbosity) {
                   "Override a scene key: key=value, e.g. solver.domains=16")
       ->allow_extra_args(false);
   app->add_flag("--no-images", arguments->no_images, "Draw nothing; needs no OpenGL");
+  app->add_flag("--strict", arguments->strict,
+                "Exit with 1 if anything passed through anything after any step");
   app->add_flag("--log-iterations", arguments->log_iterations,
                 "Also write iterations.csv: energy, gradient, increments of every iteration");
   app->add_flag("--no-state", arguments->no_state,

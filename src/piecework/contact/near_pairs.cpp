@@ -35,13 +35,11 @@ bool NearPairs::contains(const Points& x) const {
 
 bool NearPairs::cover(const Points& from, const Points& to) {
   if (contains(from) && contains(to)) return false;
-  const bool first = boxes_.empty();
   boxes_.resize(at(from.count()));
   parallel_for(boxes_.size(), [&](std::size_t v) {
     const Vec3 a = from(static_cast<int>(v)), b = to(static_cast<int>(v));
-    const Vec3 low = a.cwiseMin(b).array() - slack_, high = a.cwiseMax(b).array() + slack_;
-    boxes_[v].low = first ? low : low.cwiseMin(boxes_[v].low);
-    boxes_[v].high = first ? high : high.cwiseMax(boxes_[v].high);
+    boxes_[v].low = a.cwiseMin(b).array() - slack_;
+    boxes_[v].high = a.cwiseMax(b).array() + slack_;
   });
   list_candidates();
   made_at_.resize(0, 3);

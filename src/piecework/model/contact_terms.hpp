@@ -14,7 +14,7 @@ struct ContactStiffness {
   Eigen::VectorXd across;  ///< |V|: in the others: friction, and contact from aside
 };
 
-/// Counts and times of one step; what did not run is negative.
+/// Counts and times of one step.
 struct ContactReport {
   int pairs = 0;              ///< closer than the contact distance at the end of the step
   int candidates = 0;         ///< pairs that the broad phase proposed last
@@ -23,7 +23,9 @@ struct ContactReport {
   double held_back = 0;       ///< fraction of the motion of pins and obstacles that cloth barred
   double cull_ms = 0;         ///< Cull: broad phase
   double narrow_ms = 0;       ///< Nrw.: distances, forces, continuous detection
-  double check_ms = -1;       ///< the independent check for interpenetrations
+  double check_ms = -1;       ///< the independent check for interpenetrations; negative: off
+
+  [[nodiscard]] double detection_ms() const { return cull_ms + narrow_ms; }
 };
 
 /// Contact during one step: an energy E_c(x) that rises as things come closer than the contact

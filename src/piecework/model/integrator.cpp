@@ -66,6 +66,14 @@ bool Integrator::extrapolate_to(double end, const State& state) {
   return true;
 }
 
+void Integrator::finish_contact(StepReport& report) {
+  contact_->end_step(x_);
+  report.contact = contact_->report();
+  report.phases.cull = report.contact->cull_ms;
+  report.phases.narrow = report.contact->narrow_ms;
+  report.phases.check = report.contact->check_ms;
+}
+
 StepReport Integrator::step(State& state) {
   const Stopwatch total;
   Stopwatch phase;
@@ -109,10 +117,9 @@ StepReport Integrator::step(State& state) {
                     "use a smaller h or softer material",
                     state.step + 1, report.energy));
   model_.sewing.follow(end, x_);  // to the last bit
-  if (contact_) {
-    contact_->end_step(x_);
-    report.contact = contact_->report();
-  }
+  misc += phase.lap();
+  if (contact_) finish_contact(report);
+  phase.lap();
   if (minimizer_->wants_extrapolation()) state.previous_v = state.v;
   state.memory = std::move(memory);
   const double keep = options_.damping ? std::exp(-*options_.damping * h) : 1.0;

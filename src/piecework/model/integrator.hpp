@@ -59,6 +59,9 @@ class Integrator {
   /// Vertices that are held, slaves of held carriers included.
   [[nodiscard]] std::vector<char> held_at(double time) const;
 
+  /// Counts what passes through what in x_.
+  void finish_contact(StepReport& report);
+
   /// Fills extrapolated_; false if it is of no use, or the step before is not known.
   bool extrapolate_to(double end, const State& state);
 

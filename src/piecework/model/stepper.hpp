@@ -37,10 +37,13 @@ struct StopOptions {
 /// Milliseconds per phase of a step, columns of the paper's Table 1 as far as they apply.
 /// A phase that did not run is negative and printed as "-".
 struct PhaseTimes {
+  double cull = -1;      ///< Cull: broad phase of contact
+  double narrow = -1;    ///< Nrw.: distances, contact forces, continuous detection
   double local = -1;     ///< L: projections, gradient, energy
   double global = -1;    ///< G: the global solve
   double refactor = -1;  ///< Ref.: factorisation, in steps where pins were released
   double misc = -1;      ///< Misc.: external forces, prediction, pins, velocities
+  double check = -1;     ///< the independent check for interpenetrations
 };
 
 /// What a step did, and how well.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <utility>
 
 #include <fmt/format.h>
@@ -99,16 +100,19 @@ model::SetupReport DdPd::setup_report() const {
   return {report.analyze_ms + report.factor_ms, report.nonzeros, static_cast<double>(report.bytes)};
 }
 
+double DdPd::detection_ms() const { return contact_ ? contact_->report().detection_ms() : 0.0; }
+
 void DdPd::evaluate(Point& point, const model::StepProblem& problem, model::StepReport& report) {
   const Stopwatch watch;
   if (sweeps_) sweeps_->sweep(point.x, problem, report.iterations);
   const auto result = local_.evaluate(point.x, problem, gradient_);
   point.energy = result.energy;
+  const double detection_before = detection_ms();
   if (contact_) point.energy += contact_->evaluate(point.x, gradient_);
   metric_.reduction().gather(gradient_, point.g);
   point.degenerate = result.degenerate;
   ++report.evaluations;
-  report.phases.local += watch.elapsed_ms();
+  report.phases.local += watch.elapsed_ms() - (detection_ms() - detection_before);
 }
 
 void DdPd::choose_start(const model::StepProblem& problem, const Positions& predicted,
@@ -145,7 +149,8 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
   if (options_.normals == NormalPart::Never && !touching) return;
   const bool doubtful = convergence_.reached(report) && !believable(report);
   if (report.normal_factors > 0) {
-    if (report.iterations >= last_refresh_ + kIterationsPerRefresh ||
+    static const int per = getenv("PW_REF") ? atoi(getenv("PW_REF")) : kIterationsPerRefresh;
+    if (report.iterations >= last_refresh_ + (touching?per:kIterationsPerRefresh) ||
         (doubtful && normals_are_outdated(report)))
       refresh_normals(report);
     return;
@@ -235,9 +240,9 @@ void DdPd::advance_held(const model::StepProblem& problem, model::StepReport& re
 /// One iteration; false if no direction leads down any more.
 bool DdPd::move(const model::StepProblem& problem, model::StepReport& report) {
   const Stopwatch watch;
-  const double local_before = report.phases.local;
+  const double others_before = report.phases.local + detection_ms();
   const auto finish = [&](bool moved) {
-    report.phases.global += watch.elapsed_ms() - (report.phases.local - local_before);
+    report.phases.global += watch.elapsed_ms() - (report.phases.local + detection_ms() - others_before);
     return moved;
   };
   for (;;) {

@@ -75,6 +75,7 @@ class DdPd final : public model::Minimizer {
   bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
+  [[nodiscard]] double detection_ms() const;
   void find_moved();
   void advance_held(const model::StepProblem& problem, model::StepReport& report);
   [[nodiscard]] bool normals_are_outdated(const model::StepReport& report) const;

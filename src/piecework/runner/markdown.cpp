@@ -63,10 +63,11 @@ std::string table_one(const RunRecord& record, const World& world) {
       "| PCG | Misc. | Min | Max | Med | Avg |\n"
       "|:--|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
   text += fmt::format(
-      "| {} | {} | {} | {} | {}\\|{}\\|{} | {} | - | - | {} | {} | {} | - | - | {} | {} | {} | {} "
+      "| {} | {} | {} | {} | {}\\|{}\\|{} | {} | {} | {} | {} | {} | {} | - | - | {} | {} | {} | {} "
       "| {} |\n",
       plain_cell(world.scene.name), s.domains, 3 * world.model.num_vertices(),
       world.model.triangles.size(), s.corner, s.boundary, s.remainder, three_digits(iterations),
+      phase(&model::PhaseTimes::cull), phase(&model::PhaseTimes::narrow),
       phase(&model::PhaseTimes::local), phase(&model::PhaseTimes::global),
       phase(&model::PhaseTimes::refactor), phase(&model::PhaseTimes::misc),
       three_digits(fastest(record)), three_digits(slowest(record)), three_digits(median.median),
@@ -98,10 +99,14 @@ std::string phase_table(const RunRecord& record) {
     text += fmt::format("| {} | {} | {} | {} | {} |\n", name, median_cell(median_interval(v)),
                         milliseconds(mean(v)), share, v.size());
   };
+  row("Broad phase (Cull)", [](const FrameRecord& f) { return f.phases.cull; });
+  row("Contact forces, continuous detection (Nrw.)",
+      [](const FrameRecord& f) { return f.phases.narrow; });
   row("Local step (L)", [](const FrameRecord& f) { return f.phases.local; });
   row("Global step (G)", [](const FrameRecord& f) { return f.phases.global; });
   row("Refactorisation (Ref.)", [](const FrameRecord& f) { return f.phases.refactor; });
   row("Forces, prediction, velocities (Misc.)", [](const FrameRecord& f) { return f.phases.misc; });
+  row("Check for interpenetrations", [](const FrameRecord& f) { return f.phases.check; });
   row(phases_explain(record) ? "Other" : "Other **FAIL**: the phases do not add up to the step",
       [](const FrameRecord& f) { return std::max(0.0, f.other_ms()); });
   row("**Step**", [](const FrameRecord& f) { return f.step_ms; });
@@ -120,6 +125,11 @@ std::string accuracy_table(const RunRecord& record) {
   row("Estimated position error (mean edge lengths)", [](const FrameRecord& f) { return f.error; });
   row("L-G iterations per step",
       [](const FrameRecord& f) { return double(f.iterations) / f.steps; });
+  const auto contact = [&](const char* name, int model::ContactReport::*member) {
+    row(name, [member](const FrameRecord& f) { return f.contact ? *f.contact.*member : -1.0; });
+  };
+  contact("Pairs in contact", &model::ContactReport::pairs);
+  contact("Interpenetrations", &model::ContactReport::interpenetrations);
   row("Last increment, 2-norm in the unit box (the paper's stop)",
       [](const FrameRecord& f) { return f.dx_2; });
   return text;

@@ -24,13 +24,47 @@ struct PhaseColumn {
   const char* key;
   double model::PhaseTimes::*member;
 };
-constexpr PhaseColumn kPhases[] = {{"local", &model::PhaseTimes::local},
+constexpr PhaseColumn kPhases[] = {{"cull", &model::PhaseTimes::cull},
+                                   {"narrow", &model::PhaseTimes::narrow},
+                                   {"local", &model::PhaseTimes::local},
                                    {"global", &model::PhaseTimes::global},
                                    {"refactor", &model::PhaseTimes::refactor},
-                                   {"misc", &model::PhaseTimes::misc}};
+                                   {"misc", &model::PhaseTimes::misc},
+                                   {"check", &model::PhaseTimes::check}};
+
+struct ContactCounter {
+  const char* key;
+  int model::ContactReport::*member;
+};
+constexpr ContactCounter kContactCounters[] = {
+    {"contact_pairs", &model::ContactReport::pairs},
+    {"candidate_pairs", &model::ContactReport::candidates},
+    {"shortened_moves", &model::ContactReport::shortened},
+    {"interpenetrations", &model::ContactReport::interpenetrations}};
 
 void add_phase(double& sum, double value) {
   if (value >= 0) sum = std::max(sum, 0.0) + value;
+}
+
+Json counters_json(const FrameRecord& frame) {
+  Json counters = {{"iterations", frame.iterations},
+                   {"global_solves", frame.global_solves},
+                   {"converged_steps", frame.converged_steps},
+                   {"degenerate_projections", frame.degenerate_projections}};
+  if (!frame.contact) return counters;
+  for (const auto& [key, member] : kContactCounters) counters[key] = *frame.contact.*member;
+  return counters;
+}
+
+/// \param counters  as counters_json() writes them
+void read_counters(const Json& counters, FrameRecord& frame) {
+  frame.iterations = counters.at("iterations");
+  frame.global_solves = counters.at("global_solves");
+  frame.converged_steps = counters.at("converged_steps");
+  frame.degenerate_projections = counters.at("degenerate_projections");
+  if (!counters.contains(kContactCounters[0].key)) return;
+  frame.contact.emplace();
+  for (const auto& [key, member] : kContactCounters) *frame.contact.*member = counters.at(key);
 }
 
 Json frame_json(const FrameRecord& frame) {
@@ -46,11 +80,7 @@ Json frame_json(const FrameRecord& frame) {
           {"step_ms_min", frame.step_min_ms},
           {"step_ms_max", frame.step_max_ms},
           {"phases_ms", phases},
-          {"counters",
-           {{"iterations", frame.iterations},
-            {"global_solves", frame.global_solves},
-            {"converged_steps", frame.converged_steps},
-            {"degenerate_projections", frame.degenerate_projections}}},
+          {"counters", counters_json(frame)},
           {"gradient", frame.gradient},
           {"error_mean_edges", frame.error},
           {"energy_j", frame.energy},
@@ -68,11 +98,7 @@ FrameRecord frame_from_json(const Json& json) {
   frame.step_max_ms = json.at("step_ms_max");
   for (const auto& [key, member] : kPhases)
     if (json.at("phases_ms").contains(key)) frame.phases.*member = json.at("phases_ms").at(key);
-  const Json& counters = json.at("counters");
-  frame.iterations = counters.at("iterations");
-  frame.global_solves = counters.at("global_solves");
-  frame.converged_steps = counters.at("converged_steps");
-  frame.degenerate_projections = counters.at("degenerate_projections");
+  read_counters(json.at("counters"), frame);
   frame.gradient = json.at("gradient");
   // JSON has no infinity: an estimate that does not exist yet is null.
   const auto number = [](const Json& value) {
@@ -125,12 +151,22 @@ void FrameRecord::add(const model::StepReport& report) {
   global_solves += report.global_solves;
   converged_steps += report.converged;
   degenerate_projections += report.degenerate_projections;
+  if (report.contact) add_contact(*report.contact);
   gradient = std::max(gradient, report.gradient);
   error = std::max(error, report.error);
   energy = report.energy;
   dx_2 = report.dx_2;
   dx_rms = report.dx_rms;
   dx_inf = report.dx_inf;
+}
+
+void FrameRecord::add_contact(const model::ContactReport& report) {
+  if (!contact) contact.emplace();
+  for (const auto& [key, member] : kContactCounters) {
+    int& value = *contact.*member;
+    value = member == &model::ContactReport::shortened ? value + report.*member
+                                                       : std::max(value, report.*member);
+  }
 }
 
 void FrameRecord::finish(int frame_number, const model::State& state) {
@@ -154,6 +190,8 @@ Totals totals(const std::vector<FrameRecord>& frames) {
     sum.steps += frame.steps;
     sum.converged_steps += frame.converged_steps;
     sum.iterations += frame.iterations;
+    if (frame.contact)
+      sum.interpenetrations = std::max(sum.interpenetrations, frame.contact->interpenetrations);
   }
   return sum;
 }

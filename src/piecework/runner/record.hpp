@@ -4,6 +4,7 @@
 // renderings; nothing is measured twice.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -27,6 +28,8 @@ struct FrameRecord {
   int global_solves = 0;
   int converged_steps = 0;
   int degenerate_projections = 0;
+  /// Largest of its steps, `shortened` their sum; absent: nothing can touch.
+  std::optional<model::ContactReport> contact;
   double gradient = 0;                      ///< largest of its steps
   double error = 0;                         ///< largest of its steps, in mean edge lengths
   double energy = 0;                        ///< of the last step, J
@@ -35,6 +38,7 @@ struct FrameRecord {
   void add(const model::StepReport& report);
   /// Turns sums of times into means per step.
   void finish(int frame_number, const model::State& state);
+  void add_contact(const model::ContactReport& report);
   /// step_ms minus the phases, ms.
   [[nodiscard]] double other_ms() const;
 };
@@ -44,6 +48,7 @@ struct Totals {
   int steps = 0;
   int converged_steps = 0;
   int iterations = 0;
+  int interpenetrations = 0;  ///< largest of any step
 };
 Totals totals(const std::vector<FrameRecord>& frames);
 
