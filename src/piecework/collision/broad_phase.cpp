@@ -1,145 +1,222 @@
 #include <piecework/collision/broad_phase.hpp>
 
 #include <algorithm>
-#include <numeric>
+#include <cmath>
+#include <limits>
 
+#include <fmt/format.h>
+
+#include <piecework/core/clock.hpp>
 #include <piecework/core/error.hpp>
+#include <piecework/core/parallel.hpp>
+
+#include "box_blocks.hpp"
+#include "box_kernels.hpp"
+#include "pair_search.hpp"
+#include "unit_frame.hpp"
 
 namespace piecework::collision {
 namespace {
+
+/// Largest coordinate, m: differences of any two, and their products with scales, stay finite.
+constexpr double kFarthest = 1e100;
+
+/// A tree is built anew when its boxes have grown so much against those of its elements since it
+/// was built (chosen: building costs about a fifth of a search, which slows down as boxes grow).
+constexpr double kRebuildGrowth = 1.5;
+
+bool is_valid(const VertexBox& box) {
+  return (box.low.array() <= box.high.array()).all() && (box.low.array() >= -kFarthest).all() &&
+         (box.high.array() <= kFarthest).all();
+}
+
+void check(std::span<const VertexBox> boxes, double gap) {
+  if (!(gap >= 0 && gap <= kFarthest))
+    throw SimulationError(fmt::format("broad phase: gap {} m is not in [0, {}]", gap, kFarthest));
+  const auto bad = [&](std::size_t v) { return is_valid(boxes[v]) ? 0.0 : 1.0; };
+  if (parallel_max(boxes.size(), bad) == 0) return;
+  const auto first = std::find_if_not(boxes.begin(), boxes.end(), is_valid);
+  throw SimulationError(
+      fmt::format("broad phase: vertex {}: box from ({}, {}, {}) to ({}, {}, {}) is empty, not "
+                  "finite or beyond "
+                  "{} m",
+                  first - boxes.begin(), first->low[0], first->low[1], first->low[2],
+                  first->high[0], first->high[1], first->high[2], kFarthest));
+}
 
 VertexBox united(const VertexBox& a, const VertexBox& b) {
   return {a.low.cwiseMin(b.low), a.high.cwiseMax(b.high)};
 }
 
-bool near(const VertexBox& a, const VertexBox& b, double gap) {
+/// The definition of find().
+bool within_gap(const VertexBox& a, const VertexBox& b, double gap) {
   return (a.low - b.high).maxCoeff() <= gap && (b.low - a.high).maxCoeff() <= gap;
 }
 
-/// Boxes halved at the median of their longest side, leaf by leaf.
-class BoxTree {
- public:
-  void build(std::vector<int> items, const std::vector<VertexBox>& boxes) {
-    items_ = std::move(items);
-    nodes_.clear();
-    if (!items_.empty()) split(0, items_.size(), boxes);
+/// Around boxes of cloth. Its corner is one of a grid as wide as the cloth, so that the frame, and
+/// with it the rows of obstacles at rest, stay the same while little moves.
+UnitFrame frame_around(std::span<const VertexBox> boxes) {
+  const double inf = std::numeric_limits<double>::infinity();
+  const VertexBox nothing{Vec3::Constant(inf), Vec3::Constant(-inf)};
+  const VertexBox all = parallel_reduce_blocks(
+      boxes.size(), nothing,
+      [&](std::size_t begin, std::size_t end, VertexBox sum) {
+        for (std::size_t v = begin; v < end; ++v) sum = united(sum, boxes[v]);
+        return sum;
+      },
+      united, kParallelGrain);
+  int exponent = 0;
+  std::frexp((all.high - all.low).maxCoeff(), &exponent);
+  UnitFrame frame;
+  frame.scale = std::ldexp(1.0, -std::clamp(exponent, -500, 500));
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double steps = all.low[axis] * frame.scale;
+    const bool resolved = std::abs(steps) < 0x1.0p53;
+    frame.origin[axis] = resolved ? std::floor(steps) / frame.scale : all.low[axis];
   }
+  return frame;
+}
 
-  template <class Visit>
-  void visit_near(const VertexBox& box, double gap, const std::vector<VertexBox>& boxes,
-                  std::size_t& tests, const Visit& visit) const {
-    for (std::size_t k = 0; k < nodes_.size();) {
-      const Node& node = nodes_[k];
-      ++tests;
-      if (!near(node.box, box, gap)) {
-        k = node.skip;
-        continue;
-      }
-      if (node.skip == k + 1)
-        for (std::size_t i = node.begin; i < node.end; ++i) {
-          ++tests;
-          if (near(boxes[static_cast<std::size_t>(items_[i])], box, gap)) visit(items_[i]);
-        }
-      ++k;
-    }
+/// Elements of one kind that belong to cloth, or to obstacles.
+template <class List>
+std::vector<Element> elements_of(const List& list, const Surface& surface, bool cloth) {
+  std::vector<Element> result;
+  for (std::size_t e = 0; e < list.size(); ++e) {
+    const auto& vertices = list[e];
+    if (surface.is_cloth(vertices[0]) != cloth) continue;
+    Element element{static_cast<int>(e), {}};
+    for (std::size_t k = 0; k < kMaxVertices; ++k)
+      element.vertices[k] = vertices[std::min(k, vertices.size() - 1)];
+    result.push_back(element);
   }
+  return result;
+}
 
- private:
-  static constexpr std::size_t kLeaf = 4;
-  struct Node {
-    VertexBox box;
-    std::size_t begin, end;
-    std::size_t skip;  ///< the next node that is not below this one
-  };
+std::vector<std::array<int, 1>> all_vertices(const Surface& surface) {
+  std::vector<std::array<int, 1>> result;
+  for (int v = 0; v < surface.num_vertices; ++v) result.push_back({v});
+  return result;
+}
 
-  void split(std::size_t begin, std::size_t end, const std::vector<VertexBox>& boxes) {
-    const auto box_of = [&](int item) -> const VertexBox& {
-      return boxes[static_cast<std::size_t>(item)];
+/// Cloth or obstacles: what is built and refitted together.
+struct Body {
+  Body(const Surface& surface, bool cloth)
+      : first(cloth ? 0 : static_cast<std::size_t>(surface.num_cloth_vertices)),
+        end(static_cast<std::size_t>(cloth ? surface.num_cloth_vertices : surface.num_vertices)),
+        vertices(elements_of(all_vertices(surface), surface, cloth), false),
+        edges(elements_of(surface.edges, surface, cloth), true),
+        triangles(elements_of(surface.triangles, surface, cloth), false) {}
+
+  std::array<BoxBlocks*, 3> kinds() { return {&vertices, &edges, &triangles}; }
+
+  /// Returns whether any box of its vertices has changed.
+  bool take_rows(std::span<const VertexBox> boxes, const UnitFrame& frame,
+                 std::span<BoxRow> rows) const {
+    const auto take = [&](std::size_t i) {
+      const BoxRow row = frame.row(boxes[first + i]);
+      BoxRow& old = rows[first + i];
+      const bool same = std::equal(row.number, row.number + 8, old.number);
+      old = row;
+      return same ? 0.0 : 1.0;
     };
-    const std::size_t self = nodes_.size();
-    VertexBox all = box_of(items_[begin]);
-    for (std::size_t i = begin; i < end; ++i) all = united(all, box_of(items_[i]));
-    nodes_.push_back({all, begin, end, 0});
-    if (end - begin > kLeaf) {
-      Eigen::Index axis = 0;
-      (all.high - all.low).maxCoeff(&axis);
-      const std::size_t middle = (begin + end) / 2;
-      const auto at = [&](std::size_t i) {
-        return items_.begin() + static_cast<std::ptrdiff_t>(i);
-      };
-      std::nth_element(at(begin), at(middle), at(end), [&](int a, int b) {
-        return box_of(a).low[axis] + box_of(a).high[axis] <
-               box_of(b).low[axis] + box_of(b).high[axis];
-      });
-      split(begin, middle, boxes);
-      split(middle, end, boxes);
-    }
-    nodes_[self].skip = nodes_.size();
+    return parallel_max(end - first, take) > 0;
   }
 
-  std::vector<int> items_;
-  std::vector<Node> nodes_;
+  Areas refit(std::span<const BoxRow> rows) {
+    Areas areas;
+    for (BoxBlocks* kind : kinds()) areas += kind->refit(rows);
+    return areas;
+  }
+
+  void build(std::span<const BoxRow> rows) {
+    BoxRow bounds = kEmptyRow;
+    for (const BoxRow& row : rows.subspan(first, end - first))
+      bounds = collision::united(bounds, row);
+    for (BoxBlocks* kind : kinds()) kind->build(rows, bounds);
+    areas_when_built = refit(rows);
+    built = true;
+  }
+
+  /// Boxes after a motion; builds trees that there are not yet or that have become bad.
+  /// Returns whether it built.
+  bool update(std::span<const BoxRow> rows) {
+    if (built) {
+      const Areas now = refit(rows);
+      if (now.tree * areas_when_built.elements <=
+          kRebuildGrowth * areas_when_built.tree * now.elements)
+        return false;
+    }
+    build(rows);
+    return true;
+  }
+
+  std::size_t first, end;  // vertices
+  BoxBlocks vertices, edges, triangles;
+  bool built = false;
+  Areas areas_when_built;
 };
+
+std::vector<SearchGroup> vertex_groups(const Body& cloth, const Body& obstacle, bool self) {
+  SearchGroup of_cloth{&cloth.vertices, {}};
+  if (self) of_cloth.others.push_back(&cloth.triangles);
+  of_cloth.others.push_back(&obstacle.triangles);
+  return {of_cloth, {&obstacle.vertices, {&cloth.triangles}}};
+}
+
+std::vector<SearchGroup> edge_groups(const Body& cloth, const Body& obstacle, bool self) {
+  SearchGroup of_cloth{&cloth.edges, {}};
+  if (self) of_cloth.others.push_back(&cloth.edges);
+  of_cloth.others.push_back(&obstacle.edges);
+  return {of_cloth};
+}
 
 }  // namespace
 
 struct BroadPhase::Impl {
-  explicit Impl(Surface s) : surface(std::move(s)) {}
+  explicit Impl(Surface s)
+      : surface(std::move(s)),
+        cloth(surface, true),
+        obstacle(surface, false),
+        rows(static_cast<std::size_t>(surface.num_vertices), kEmptyRow),
+        vertices(vertex_groups(cloth, obstacle, surface.self),
+                 static_cast<std::size_t>(surface.num_vertices)),
+        edges(edge_groups(cloth, obstacle, surface.self), surface.edges.size()) {}
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() = default;
 
-  template <class Elements>
-  void unite(std::span<const VertexBox> boxes, const Elements& elements,
-             std::vector<VertexBox>& result) {
-    result.clear();
-    for (const auto& element : elements) {
-      VertexBox box = boxes[static_cast<std::size_t>(element[0])];
-      for (const int v : element) box = united(box, boxes[static_cast<std::size_t>(v)]);
-      result.push_back(box);
-    }
+  void update(std::span<const VertexBox> boxes, const UnitFrame& frame) {
+    for (Body* body : {&cloth, &obstacle})
+      if (body->take_rows(boxes, frame, rows) || !body->built) report.rebuilt |= body->update(rows);
   }
 
-  [[nodiscard]] bool may_meet(int vertex_a, int vertex_b) const {
-    const bool a = surface.is_cloth(vertex_a), b = surface.is_cloth(vertex_b);
-    return a != b || (a && surface.self);
+  template <class A, class B>
+  [[nodiscard]] bool near(const A& a, const B& b) const {
+    const auto box_of = [&](const auto& element) {
+      VertexBox box = boxes_now[static_cast<std::size_t>(element[0])];
+      for (const int v : element) box = united(box, boxes_now[static_cast<std::size_t>(v)]);
+      return box;
+    };
+    return within_gap(box_of(a), box_of(b), gap_now);
   }
-
-  static std::vector<int> all(std::size_t count) {
-    std::vector<int> items(count);
-    std::iota(items.begin(), items.end(), 0);
-    return items;
+  static bool vertex_near_triangle(const void* context, int v, int t) {
+    const Impl& self = *static_cast<const Impl*>(context);
+    return self.near(std::array{v}, self.surface.triangles[static_cast<std::size_t>(t)]);
   }
-
-  void find_vertex_triangle(std::span<const VertexBox> boxes, double gap) {
-    for (int v = 0; v < surface.num_vertices; ++v) {
-      triangle_tree.visit_near(
-          boxes[static_cast<std::size_t>(v)], gap, triangle_boxes, report.box_tests, [&](int t) {
-            const Triangle& corners = surface.triangles[static_cast<std::size_t>(t)];
-            if (may_meet(v, corners[0]) &&
-                std::find(corners.begin(), corners.end(), v) == corners.end())
-              pairs.vertex_triangle.push_back({v, t});
-          });
-    }
-    std::sort(pairs.vertex_triangle.begin(), pairs.vertex_triangle.end());
-  }
-
-  void find_edge_edge(double gap) {
-    for (std::size_t e = 0; e < surface.edges.size(); ++e) {
-      const auto [a, b] = surface.edges[e];
-      edge_tree.visit_near(edge_boxes[e], gap, edge_boxes, report.box_tests,
-                           [&, a = a, b = b](int f) {
-                             const auto [c, d] = surface.edges[static_cast<std::size_t>(f)];
-                             const bool shared = a == c || a == d || b == c || b == d;
-                             if (static_cast<int>(e) < f && !shared && may_meet(a, c))
-                               pairs.edge_edge.push_back({static_cast<int>(e), f});
-                           });
-    }
-    std::sort(pairs.edge_edge.begin(), pairs.edge_edge.end());
+  static bool edge_near_edge(const void* context, int e, int f) {
+    const Impl& self = *static_cast<const Impl*>(context);
+    return self.near(self.surface.edges[static_cast<std::size_t>(e)],
+                     self.surface.edges[static_cast<std::size_t>(f)]);
   }
 
   Surface surface;
+  Body cloth, obstacle;
+  std::vector<BoxRow> rows;  // by vertex
+  PairSearch vertices, edges;
   CandidatePairs pairs;
   BroadPhaseReport report;
-  std::vector<VertexBox> triangle_boxes, edge_boxes;
-  BoxTree triangle_tree, edge_tree;
+  std::span<const VertexBox> boxes_now;  // during find()
+  double gap_now = 0;
 };
 
 BroadPhase::BroadPhase(Surface surface) : impl_(std::make_unique<Impl>(std::move(surface))) {}
@@ -149,17 +226,26 @@ const Surface& BroadPhase::surface() const { return impl_->surface; }
 const BroadPhaseReport& BroadPhase::report() const { return impl_->report; }
 
 const CandidatePairs& BroadPhase::find(std::span<const VertexBox> boxes, double gap) {
+  PIECEWORK_ASSERT(boxes.size() == impl_->rows.size());
+  check(boxes, gap);
   Impl& self = *impl_;
-  PIECEWORK_ASSERT(static_cast<int>(boxes.size()) == self.surface.num_vertices);
-  self.pairs.vertex_triangle.clear();
-  self.pairs.edge_edge.clear();
-  self.report = {.rebuilt = true};
-  self.unite(boxes, self.surface.triangles, self.triangle_boxes);
-  self.unite(boxes, self.surface.edges, self.edge_boxes);
-  self.triangle_tree.build(Impl::all(self.triangle_boxes.size()), self.triangle_boxes);
-  self.edge_tree.build(Impl::all(self.edge_boxes.size()), self.edge_boxes);
-  self.find_vertex_triangle(boxes, gap);
-  self.find_edge_edge(gap);
+  self.report = {};
+  if (self.surface.num_cloth_vertices == 0) return self.pairs;
+  Stopwatch watch;
+  const UnitFrame frame = frame_around(boxes.first(self.cloth.end));
+  self.update(boxes, frame);
+  self.report.build_ms = watch.lap();
+
+  self.boxes_now = boxes;
+  self.gap_now = gap;
+  const BoxKernels& kernels = box_kernels(best_isa());
+  const Reach reach = reach_of(gap, frame);
+  self.report.box_tests =
+      self.vertices.run(kernels.vertices_with_triangles, kernels, reach,
+                        {&self, Impl::vertex_near_triangle}, self.pairs.vertex_triangle) +
+      self.edges.run(kernels.edges_with_edges, kernels, reach, {&self, Impl::edge_near_edge},
+                     self.pairs.edge_edge);
+  self.report.query_ms = watch.lap();
   return self.pairs;
 }
 
