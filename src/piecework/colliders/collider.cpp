@@ -25,8 +25,7 @@ bool is_closed(const Triangles& triangles) {
   for (std::size_t i = 0; i < sides.size(); i += 2) {
     const mesh::HalfEdge& a = sides[i];
     const mesh::HalfEdge& b = sides[i + 1];
-    const bool crowded =
-        i + 2 < sides.size() && sides[i + 2].v0 == a.v0 && sides[i + 2].v1 == a.v1;
+    const bool crowded = i + 2 < sides.size() && sides[i + 2].v0 == a.v0 && sides[i + 2].v1 == a.v1;
     if (a.v0 != b.v0 || a.v1 != b.v1 || a.v0 == a.v1 || a.forward == b.forward || crowded)
       return false;
   }
@@ -81,9 +80,8 @@ mesh::TriangleMesh AnalyticCollider::tessellate(double time, double extent) cons
   return mesh;
 }
 
-MeshCollider::MeshCollider(Traits traits, mesh::TriangleMesh mesh,
-                           const Eigen::Affine3d& placement, RigidMotion motion,
-                           Deformation deformation)
+MeshCollider::MeshCollider(Traits traits, mesh::TriangleMesh mesh, const Eigen::Affine3d& placement,
+                           RigidMotion motion, Deformation deformation)
     : traits_(std::move(traits)),
       mesh_(std::move(mesh)),
       placement_(placement),

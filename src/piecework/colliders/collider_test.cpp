@@ -76,8 +76,7 @@ TEST(AnalyticCollider, NamesItselfInRefusals) {
 
 double volume(const Triangles& triangles, const Positions& x) {
   double sum = 0;
-  for (const Triangle& t : triangles)
-    sum += x.row(t[0]).dot(x.row(t[1]).cross(x.row(t[2]))) / 6;
+  for (const Triangle& t : triangles) sum += x.row(t[0]).dot(x.row(t[1]).cross(x.row(t[2]))) / 6;
   return sum;
 }
 
@@ -108,9 +107,7 @@ TEST(MeshCollider, MirroringTurnsTheTriangles) {
 
 TEST(MeshCollider, DeformsBeforeItIsPlacedAndMoved) {
   const mesh::TriangleMesh box = mesh::box(Vec3(1, 2, 3));
-  const Deformation grow = [&](double time, Positions& out) {
-    out = (1 + time) * box.positions;
-  };
+  const Deformation grow = [&](double time, Positions& out) { out = (1 + time) * box.positions; };
   const MeshCollider collider({"box", {}, {}}, box, Eigen::Affine3d(tilted()), spin(), grow);
   EXPECT_FALSE(collider.is_static());
   Positions x;

@@ -31,7 +31,8 @@ std::vector<Vec3> cut(const std::vector<Vec3>& polygon, const Vec3& normal, doub
     const double above_a = normal.dot(a) - offset;
     const double above_b = normal.dot(b) - offset;
     if (above_a <= 0) kept.push_back(a);
-    if ((above_a <= 0) != (above_b <= 0)) kept.push_back(a + above_a / (above_a - above_b) * (b - a));
+    if ((above_a <= 0) != (above_b <= 0))
+      kept.push_back(a + above_a / (above_a - above_b) * (b - a));
   }
   return kept;
 }

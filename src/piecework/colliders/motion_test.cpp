@@ -34,8 +34,13 @@ TEST(RigidMotion, AQuarterTurnThenAShift) {
 
 // Colliders and pins read the same keys: they must go the same way.
 TEST(RigidMotion, MovesAsAPinDoes) {
-  const model::Pin pin{.vertices = {0}, .velocity = Vec3(0.3, -1, 2), .axis = Vec3(1, 2, -0.5),
-                       .center = Vec3(0.2, 0, 3), .rate = -4, .start = 0.5, .stop = 2};
+  const model::Pin pin{.vertices = {0},
+                       .velocity = Vec3(0.3, -1, 2),
+                       .axis = Vec3(1, 2, -0.5),
+                       .center = Vec3(0.2, 0, 3),
+                       .rate = -4,
+                       .start = 0.5,
+                       .stop = 2};
   const RigidMotion motion{pin.velocity, pin.axis, pin.center, pin.rate, pin.start, pin.stop};
   Positions start(1, 3);
   start << 1, -2, 0.7;

@@ -58,8 +58,8 @@ SignedDistance distance_to(const Capsule& capsule, const Vec3& p) {
 /// Distance from the box |q_i| <= 0 grown by `rounding`, in the octant of positive coordinates:
 /// q are the distances beyond its faces. The normal is in that octant.
 template <int N>
-std::pair<double, Eigen::Matrix<double, N, 1>> octant_distance(
-    const Eigen::Matrix<double, N, 1>& q, double rounding) {
+std::pair<double, Eigen::Matrix<double, N, 1>> octant_distance(const Eigen::Matrix<double, N, 1>& q,
+                                                               double rounding) {
   const Eigen::Matrix<double, N, 1> outside = q.cwiseMax(0);
   const double length = outside.stableNorm();
   if (length > 0) return {length - rounding, outside / length};

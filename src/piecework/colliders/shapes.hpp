@@ -42,9 +42,9 @@ struct Capsule {
 /// Edges parallel to x, y and z. Where several faces are equally near the normal is that of the
 /// first in the order +x, -x, +y, ...
 struct Box {
-  Vec3 center = Vec3::Zero();         ///< m
+  Vec3 center = Vec3::Zero();          ///< m
   Vec3 half_size = Vec3::Constant(1);  ///< m
-  double rounding = 0;  ///< radius of edges and corners, m; the box keeps its size
+  double rounding = 0;                 ///< radius of edges and corners, m; the box keeps its size
 };
 
 /// A solid cylinder with flat ends. On its axis the normal of the side is perpendicular to the
@@ -101,7 +101,8 @@ using Shape = std::variant<Plane, Sphere, Capsule, Box, Cylinder, HalfSpaces>;
 /// Distance of p (m) from the surface, and the direction away from it.
 SignedDistance signed_distance(const Shape& shape, const Vec3& p);
 
-/// \throws InputError "<name>: ..." if a number is not finite, a size is not above 0, a direction is
+/// \throws InputError "<name>: ..." if a number is not finite, a size is not above 0, a direction
+/// is
 ///         missing or a rounding is larger than the shape.
 void validate(const Shape& shape, const std::string& name);
 

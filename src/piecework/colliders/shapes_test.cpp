@@ -47,8 +47,9 @@ const std::vector<Example>& examples() {
       {"rounded cylinder", Cylinder{Vec3(-0.4, 0.1, 0), Vec3(0.5, 0.5, 0.2), 0.6, 0.2}},
       {"cube of half-spaces", HalfSpaces(cube_planes(center, half))},
       {"pyramid", HalfSpaces(pyramid_planes())},
-      {"corner", HalfSpaces({{center, Vec3(1, 0, 0.2)}, {center, Vec3(0, 1, 0)},
-                             {center, Vec3(0, 0.3, 1)}}), false},
+      {"corner",
+       HalfSpaces({{center, Vec3(1, 0, 0.2)}, {center, Vec3(0, 1, 0)}, {center, Vec3(0, 0.3, 1)}}),
+       false},
       {"wedge", HalfSpaces({{center, Vec3(1, 1, 0)}, {center, Vec3(-1, 1, 0)}}), false},
       {"slab", HalfSpaces({{center, Vec3(1, 1, 0)}, {Vec3(-1, -1, 0), Vec3(-1, -1, 0)}}), false}};
   return all;
@@ -113,8 +114,8 @@ TEST(Shapes, DistancesAreOneLipschitz) {
     for (int i = 0; i < 5000; ++i) {
       const Vec3 p = random_point(random, 1.5);
       const Vec3 q = p + random_point(random, i % 2 == 0 ? 1.0 : 1e-6);
-      const double change = signed_distance(example.shape, p).distance -
-                            signed_distance(example.shape, q).distance;
+      const double change =
+          signed_distance(example.shape, p).distance - signed_distance(example.shape, q).distance;
       EXPECT_LE(std::abs(change), (p - q).norm() + 1e-14);
     }
   }
@@ -133,10 +134,8 @@ TEST(Shapes, NormalIsTheGradient) {
       const SignedDistance here = signed_distance(example.shape, p);
       EXPECT_NEAR(here.normal.norm(), 1, 1e-12);
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        const SignedDistance above =
-            signed_distance(example.shape, p + kStep * Vec3::Unit(axis));
-        const SignedDistance below =
-            signed_distance(example.shape, p - kStep * Vec3::Unit(axis));
+        const SignedDistance above = signed_distance(example.shape, p + kStep * Vec3::Unit(axis));
+        const SignedDistance below = signed_distance(example.shape, p - kStep * Vec3::Unit(axis));
         gradient[axis] = (above.distance - below.distance) / (2 * kStep);
         smooth = smooth && (above.normal - below.normal).norm() < 1e-3;
       }
@@ -187,9 +186,9 @@ TEST(Shapes, NormalsWhereThereIsNoGradient) {
   expect(HalfSpaces({{Vec3::Zero(), Vec3::UnitX()}, {Vec3::Zero(), Vec3::UnitZ()}}), Vec3::Zero(),
          0, Vec3::UnitX());
   for (const Vec3& p : {Vec3(0, 0, 0), Vec3(0, 0.3, 0)}) {
-    for (const Shape& shape : {Shape(Capsule{Vec3(0, -1, 0), Vec3(0, 1, 0), 0.5}),
-                               Shape(Capsule{p, p, 0.5}),
-                               Shape(Cylinder{Vec3(0, -1, 0), Vec3(0, 1, 0), 0.5, 0})}) {
+    for (const Shape& shape :
+         {Shape(Capsule{Vec3(0, -1, 0), Vec3(0, 1, 0), 0.5}), Shape(Capsule{p, p, 0.5}),
+          Shape(Cylinder{Vec3(0, -1, 0), Vec3(0, 1, 0), 0.5, 0})}) {
       const SignedDistance on_axis = signed_distance(shape, p);
       EXPECT_NEAR(on_axis.distance, -0.5, 1e-15);
       EXPECT_NEAR(on_axis.normal.norm(), 1, 1e-15);
@@ -232,7 +231,8 @@ TEST(Shapes, EmptyIntersectionsAreRefused) {
   };
   const Plane below_0{Vec3::Zero(), Vec3::UnitY()};
   const Plane above_1{Vec3::UnitY(), -Vec3::UnitY()};
-  const std::vector<Plane> wedge{{Vec3(0, -1, 0), Vec3(1, 1, 0)}, {Vec3(0, -1, 0), Vec3(-1, 1, 0)},
+  const std::vector<Plane> wedge{{Vec3(0, -1, 0), Vec3(1, 1, 0)},
+                                 {Vec3(0, -1, 0), Vec3(-1, 1, 0)},
                                  {Vec3::Zero(), -Vec3::UnitY()}};
   EXPECT_NE(refusal({below_0, above_1}, 0).find("no point lies below all 2 planes"),
             std::string::npos);

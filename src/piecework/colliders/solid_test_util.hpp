@@ -35,8 +35,8 @@ inline double winding_number(const mesh::TriangleMesh& mesh, const Vec3& p) {
     const Vec3 b = mesh.positions.row(t[1]).transpose() - p;
     const Vec3 c = mesh.positions.row(t[2]).transpose() - p;
     const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    solid_angle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc +
-                                                         b.dot(c) * la + c.dot(a) * lb);
+    solid_angle += 2 * std::atan2(a.dot(b.cross(c)),
+                                  la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
   }
   return solid_angle / (4 * std::numbers::pi);
 }

@@ -14,7 +14,8 @@ void append(const TriangleMesh& piece, TriangleMesh& mesh);
 /// Surface of revolution about y. `profile` lists (radius, height), m, outside to its right: up the
 /// outside, down the inside. With radius 0 (exactly) at both ends it closes there in two poles;
 /// with radius above 0 everywhere its last point is joined to its first: a ring.
-/// \pre at least 2 points between poles or 3 in a ring; radius above 0 between the ends; columns >= 3
+/// \pre at least 2 points between poles or 3 in a ring; radius above 0 between the ends; columns >=
+/// 3
 TriangleMesh lathe(std::span<const Vec2> profile, int columns);
 
 /// A tube along a path with flat ends: circles of the given radii (m) perpendicular to it, which

@@ -47,7 +47,8 @@ TEST(Solids, IcosphereHasTheVolumeAndCountsOfASphere) {
 TEST(Solids, BoxesSharpAndRounded) {
   EXPECT_EQ(box(Vec3(1, 2, 3)).num_vertices(), 8);
   EXPECT_NEAR(volume(box(Vec3(1, 2, 3))), 6, 1e-14);
-  for (const double rounding : {0.0, 0.2, 0.5}) EXPECT_EQ(expect_solid(box(Vec3(1, 2, 3), rounding, 8)), 1);
+  for (const double rounding : {0.0, 0.2, 0.5})
+    EXPECT_EQ(expect_solid(box(Vec3(1, 2, 3), rounding, 8)), 1);
   // Steiner's formula for a core of a x b x c grown by r.
   const double r = 0.25, a = 0.5, b = 1.5, c = 2.5;
   const double expected = a * b * c + 2 * r * (a * b + b * c + c * a) + kPi * r * r * (a + b + c) +
