@@ -19,7 +19,7 @@ double dot(const Positions& a, const Positions& b) {
 
 }  // namespace
 
-bool BlockPcg::invert_diagonal(const HessianMatrix& H) {
+bool BlockPcg::invert_diagonal(const model::HessianMatrix& H) {
   inverse_.resize(static_cast<std::size_t>(H.count()));
   std::atomic<bool> positive{true};
   parallel_for(inverse_.size(), [&](std::size_t column) {
@@ -34,7 +34,7 @@ bool BlockPcg::invert_diagonal(const HessianMatrix& H) {
   return positive;
 }
 
-PcgReport BlockPcg::solve(const HessianMatrix& H, const Positions& b, const PcgOptions& options,
+PcgReport BlockPcg::solve(const model::HessianMatrix& H, const Positions& b, const PcgOptions& options,
                           Positions& x) {
   PcgReport report;
   x.setZero(b.rows(), 3);

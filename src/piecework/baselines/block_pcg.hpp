@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include <piecework/baselines/hessian_matrix.hpp>
+#include <piecework/model/hessian_matrix.hpp>
 #include <piecework/core/types.hpp>
 
 namespace piecework::baselines {
@@ -24,12 +24,12 @@ class BlockPcg {
  public:
   /// \param b       n_f x 3, N
   /// \param[out] x  n_f x 3, m
-  PcgReport solve(const HessianMatrix& H, const Positions& b, const PcgOptions& options,
+  PcgReport solve(const model::HessianMatrix& H, const Positions& b, const PcgOptions& options,
                   Positions& x);
 
  private:
   /// False if a diagonal block is not positive definite.
-  bool invert_diagonal(const HessianMatrix& H);
+  bool invert_diagonal(const model::HessianMatrix& H);
 
   std::vector<Mat3> inverse_;
   Positions residual_, preconditioned_, direction_, product_;

@@ -3,7 +3,7 @@
 // Newton's method on the incremental potential: the reference for accuracy, and a rival.
 
 #include <piecework/baselines/block_pcg.hpp>
-#include <piecework/baselines/hessian_matrix.hpp>
+#include <piecework/model/hessian_matrix.hpp>
 #include <piecework/baselines/rounding.hpp>
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/local/jacobi.hpp>
@@ -80,7 +80,7 @@ class Newton final : public model::Minimizer {
   EnergyRounding rounding_;
   std::vector<char> fixed_;
   model::Reduction reduction_;
-  HessianMatrix hessian_;
+  model::HessianMatrix hessian_;
   global::CholmodSolver cholmod_;
   BlockPcg pcg_;
   local::JacobiStep local_;

@@ -177,7 +177,7 @@ TEST(Newton, SameBitsForEveryThreadCount) {
 
 TEST(HessianMatrix, ScalarsAndProductsAreTheBlocks) {
   const TestStep step = small_step(2);
-  HessianMatrix H(step.model);
+  model::HessianMatrix H(step.model);
   const model::Reduction reduction(step.model, step.fixed);
   H.set_pattern(reduction, reduction.system(assemble_system(step.model, kTestH)));
   H.assemble(step.z, step.problem(), HessianForm::Unprojected);

@@ -40,14 +40,76 @@ double default_stiffness(const model::ClothModel& model, double h) {
   return kPart * model::assemble_system(model, h).diagonal().mean();
 }
 
-Contact::Contact(const model::ClothModel& model, ContactOptions options, Obstacles obstacles)
+Obstacles::Obstacles(std::span<const colliders::MeshCollider> meshes)
+    : meshes_(meshes), first_vertex_{0} {
+  for (const auto& mesh : meshes) {
+    const int first = first_vertex_.back();
+    for (const Triangle& t : mesh.triangles())
+      triangles_.push_back({first + t[0], first + t[1], first + t[2]});
+    first_vertex_.push_back(first + mesh.num_vertices());
+  }
+}
+
+bool Obstacles::are_static() const {
+  return std::all_of(meshes_.begin(), meshes_.end(), [](const auto& m) { return m.is_static(); });
+}
+
+void Obstacles::place(double time, Positions& x) const {
+  x.resize(num_vertices(), 3);
+  Positions one;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    meshes_[m].positions_at(time, one);
+    x.middleRows(first_vertex_[m], one.rows()) = one;
+  }
+}
+
+const colliders::MeshCollider& Obstacles::of_vertex(int v) const {
+  const auto next = std::upper_bound(first_vertex_.begin(), first_vertex_.end(), v);
+  return meshes_[static_cast<std::size_t>(next - first_vertex_.begin()) - 1];
+}
+
+double Obstacles::distance(double otherwise) const {
+  double largest = 0;
+  for (const auto& mesh : meshes_)
+    largest = std::max(largest, mesh.traits().thickness.value_or(otherwise));
+  return largest;
+}
+
+Contact::Contact(const model::ClothModel& model, ContactOptions options, const Colliders& colliders)
     : model_(model),
       options_(options),
-      obstacles_(std::move(obstacles)),
-      near_(collision::make_surface(model.triangles, model.num_vertices(), obstacles_.triangles,
-                                    obstacles_.num_vertices, options.self),
-            options.activation.distance, list_slack(model, options.activation.distance)) {
-  if (obstacles_.place) obstacles_.place(0, rest_obstacles_);
+      obstacles_(colliders.meshes),
+      bodies_(colliders.bodies, options.activation, options.friction),
+      slack_(list_slack(model, options.activation.distance)),
+      near_(collision::make_surface(model.triangles, model.num_vertices(), obstacles_.triangles(),
+                                    obstacles_.num_vertices(), options.self),
+            std::max(options.activation.distance,
+                     obstacles_.distance(options.activation.distance)),
+            slack_) {
+  obstacles_.place(0, rest_obstacles_);
+  const auto rubs = [](const auto& collider) { return collider.traits().friction.has_value(); };
+  has_friction_ = options.friction || std::any_of(colliders.bodies.begin(), colliders.bodies.end(), rubs) ||
+                  std::any_of(colliders.meshes.begin(), colliders.meshes.end(), rubs);
+}
+
+Activation Contact::activation_of(const NearPair& pair) const {
+  Activation activation = options_.activation;
+  for (const int v : pair.vertices)
+    if (v >= model_.num_vertices()) {
+      const auto& traits = obstacles_.of_vertex(v - model_.num_vertices()).traits();
+      activation.distance = traits.thickness.value_or(activation.distance);
+      break;
+    }
+  return activation;
+}
+
+double Contact::friction_of(const NearPair& pair) const {
+  for (const int v : pair.vertices)
+    if (v >= model_.num_vertices()) {
+      const auto& traits = obstacles_.of_vertex(v - model_.num_vertices()).traits();
+      return traits.friction.value_or(options_.friction.value_or(0));
+    }
+  return options_.friction.value_or(0);
 }
 
 bool Contact::is_held(int v) const {
@@ -59,14 +121,16 @@ void Contact::begin_step(const model::StepProblem& problem, double begin, double
   end_time_ = end;
   report_ = {};
   active_.clear();
-  friction_.clear();
+  sliding_.clear();
   near_.begin();
-  if (obstacles_.place) {
+  bodies_.begin_step(begin, end);
+  listed_ = -1;
+  if (obstacle_begin_.rows() == 0 || !obstacles_.are_static()) {
     obstacles_.place(begin, obstacle_begin_);
     obstacles_.place(end, obstacle_end_);
   }
   hold_at(0);
-  if (!options_.friction) return;
+  if (!has_friction_) return;
   // Pressure as the step before left it: what touches only now slides freely until it is renewed.
   const Stopwatch watch;
   near_.cover({*problem.previous, obstacle_begin_}, {*problem.predicted, obstacle_end_});
@@ -81,6 +145,7 @@ void Contact::hold_at(double fraction) {
 }
 
 double Contact::start(Positions& x) {
+  bodies_.start(*problem_->previous, *problem_->fixed, x);
   between(obstacle_begin_, obstacle_end_, 1, obstacle_now_);
   fraction_ = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
   report_.held_back = 1 - fraction_;
@@ -106,15 +171,13 @@ bool Contact::advance_held(Positions& x) {
 
 bool Contact::limit(const Positions& from, Positions& to) {
   const int before = report_.shortened;
+  if (bodies_.limit(from, *problem_->fixed, to)) ++report_.shortened;
   shorten({from, obstacle_now_}, to, obstacle_now_);
   return report_.shortened > before;
 }
 
-void Contact::find_active(const Positions& x) {
-  const Points points{x, obstacle_now_}, rest{model_.start, rest_obstacles_};
-  const Stopwatch watch;
-  if (near_.cover(points, points)) report_.cull_ms += watch.elapsed_ms();
-  const std::span<const NearPair> pairs = near_.near(points);
+void Contact::find_active_pairs(std::span<const NearPair> pairs, const Points& points) {
+  const Points rest{model_.start, rest_obstacles_};
   active_blocks_.resize((pairs.size() + kPairsPerBlock - 1) / kPairsPerBlock);
   parallel_for(
       active_blocks_.size(),
@@ -122,16 +185,28 @@ void Contact::find_active(const Positions& x) {
         active_blocks_[block].clear();
         const std::size_t end = std::min(pairs.size(), (block + 1) * kPairsPerBlock);
         ActivePair active;
-        active.friction = options_.friction.value_or(0);
-        for (std::size_t i = block * kPairsPerBlock; i < end; ++i)
-          if (activate(pairs[i], points, rest, options_.activation, active))
-            active_blocks_[block].push_back(active);
+        for (std::size_t i = block * kPairsPerBlock; i < end; ++i) {
+          if (!activate(pairs[i], points, rest, activation_of(pairs[i]), active)) continue;
+          active.friction = friction_of(pairs[i]);
+          active_blocks_[block].push_back(active);
+        }
       },
       1);
-  active_.clear();
   for (const auto& block : active_blocks_) active_.insert(active_.end(), block.begin(), block.end());
+}
+
+void Contact::find_active(const Positions& x) {
+  const Points points{x, obstacle_now_};
+  const Stopwatch watch;
+  if (near_.cover(points, points)) report_.cull_ms += watch.elapsed_ms();
+  const std::vector<NearPair>& pairs = near_.near(points).pairs;
+  if (listed_ != near_.generation()) bodies_.list(x, slack_);
+  listed_ = near_.generation();
+  active_.clear();
+  find_active_pairs(pairs, points);
+  bodies_.activate(x, active_);
   report_.pairs = static_cast<int>(active_.size());
-  report_.candidates = static_cast<int>(near_.candidates().size());
+  report_.candidates = static_cast<int>(near_.candidates().pairs.size());
 }
 
 void Contact::add_to_gradient(const collision::PairVertices& vertices, int count,
@@ -148,69 +223,108 @@ double Contact::evaluate(const Positions& x, Positions& gradient) {
     energy += pair.energy;
     add_to_gradient(pair.vertices, pair.count, pair.gradient, gradient);
   }
-  if (!friction_.empty()) energy += add_friction(x, gradient);
+  if (!sliding_.empty()) energy += add_friction(x, gradient);
   report_.narrow_ms += watch.elapsed_ms();
   return energy;
 }
 
 bool Contact::renew_friction() {
-  if (!options_.friction) return false;
+  if (!has_friction_) return false;
   const Points before{*problem_->previous, obstacle_begin_};
-  friction_.resize(active_.size());
+  sliding_.resize(active_.size());
   parallel_for(active_.size(), [&](std::size_t i) {
     const ActivePair& pair = active_[i];
-    FrictionPair& out = friction_[i];
+    FrictionPair& out = sliding_[i];
     out = {pair.vertices, pair.count, pair.beta, pair.normal, pair.friction * pair.pressure,
            Vec3::Zero()};
-    for (std::size_t k = 0; k < at(pair.count); ++k)
-      out.start += pair.beta[k] * before(pair.vertices[k]);
+    if (pair.count == 1) {
+      out.start = bodies_.unslid(pair, before(pair.vertices[0]));
+      return;
+    }
+    for (std::size_t k = 0; k < 4; ++k) out.start += pair.beta[k] * before(pair.vertices[k]);
   });
   return true;
+}
+
+Vec3 Contact::slid(const FrictionPair& pair, const Points& points) const {
+  Vec3 way = -pair.start;
+  for (std::size_t k = 0; k < at(pair.count); ++k) way += pair.beta[k] * points(pair.vertices[k]);
+  return way - way.dot(pair.normal) * pair.normal;
 }
 
 double Contact::add_friction(const Positions& x, Positions& gradient) {
   const Points points{x, obstacle_now_};
   const double slip = options_.slip_speed * options_.h;
   double energy = 0;
-  for (const FrictionPair& pair : friction_) {
-    Vec3 slid = -pair.start;
-    for (std::size_t k = 0; k < at(pair.count); ++k)
-      slid += pair.beta[k] * points(pair.vertices[k]);
-    slid -= slid.dot(pair.normal) * pair.normal;
-    const FrictionValue f = smoothed_friction(slid.norm(), slip);
+  for (FrictionPair& pair : sliding_) {
+    const Vec3 way = slid(pair, points);
+    const FrictionValue f = smoothed_friction(way.norm(), slip);
+    pair.force_ratio = f.force_ratio;
     energy += pair.limit * f.energy;
     std::array<Vec3, 4> forces;
     for (std::size_t k = 0; k < at(pair.count); ++k)
-      forces[k] = pair.limit * f.force_ratio * pair.beta[k] * slid;
+      forces[k] = pair.limit * f.force_ratio * pair.beta[k] * way;
     add_to_gradient(pair.vertices, pair.count, forces, gradient);
   }
   return energy;
 }
 
+void Contact::add_block(const collision::PairVertices& vertices, int count,
+                        const std::array<double, 4>& beta, const Mat3& stiffness,
+                        std::vector<model::ContactBlock>& blocks) const {
+  model::ContactBlock block{{}, 0, {}, stiffness};
+  for (std::size_t k = 0; k < at(count); ++k) {
+    if (is_held(vertices[k])) continue;
+    block.vertices[at(block.count)] = vertices[k];
+    block.beta[at(block.count++)] = beta[k];
+  }
+  if (block.count > 0) blocks.push_back(block);
+}
+
+void Contact::hessian(std::vector<model::ContactBlock>& blocks) const {
+  blocks.clear();
+  for (const ActivePair& pair : active_)
+    add_block(pair.vertices, pair.count, pair.beta,
+              pair.curvature * pair.normal * pair.normal.transpose(), blocks);
+  for (const FrictionPair& pair : sliding_)
+    add_block(pair.vertices, pair.count, pair.beta,
+              pair.limit * pair.force_ratio *
+                  (Mat3::Identity() - pair.normal * pair.normal.transpose()),
+              blocks);
+}
+
+void Contact::add_stiffness(const collision::PairVertices& vertices, int count,
+                            const std::array<double, 4>& beta, const Vec3& normal, double pressing,
+                            double sliding, const Positions& normals,
+                            model::ContactStiffness& stiffness) const {
+  double sum = 0;  // of |beta| over what moves: |sum beta u|^2 <= sum |beta| sum |beta| |u|^2
+  for (std::size_t k = 0; k < at(count); ++k)
+    if (!is_held(vertices[k])) sum += std::abs(beta[k]);
+  for (std::size_t k = 0; k < at(count); ++k) {
+    const int v = vertices[k];
+    if (is_held(v)) continue;
+    const double share = sum * std::abs(beta[k]);
+    const double aligned = normals.row(v).dot(normal.transpose());
+    const double along = aligned * aligned;
+    stiffness.along[v] += share * (pressing * along + sliding * (1 - along));
+    stiffness.across[v] += share * (pressing * (1 - along) + sliding);
+  }
+}
+
 void Contact::stiffness(const Positions& normals, model::ContactStiffness& stiffness) const {
   stiffness.along = Eigen::VectorXd::Zero(model_.num_vertices());
   stiffness.across = Eigen::VectorXd::Zero(model_.num_vertices());
-  const double slip = options_.slip_speed * options_.h;
-  for (const ActivePair& pair : active_) {
-    double sum = 0;  // of |beta| over what moves: |sum beta u|^2 <= sum |beta| sum |beta| |u|^2
-    for (std::size_t k = 0; k < at(pair.count); ++k)
-      if (!is_held(pair.vertices[k])) sum += std::abs(pair.beta[k]);
-    const double sticking = pair.friction * pair.pressure * 2 / slip;
-    for (std::size_t k = 0; k < at(pair.count); ++k) {
-      const int v = pair.vertices[k];
-      if (is_held(v)) continue;
-      const double share = sum * std::abs(pair.beta[k]);
-      const double aligned = normals.row(v).dot(pair.normal.transpose());
-      const double along = aligned * aligned;
-      stiffness.along[v] += share * (pair.curvature * along + sticking * (1 - along));
-      stiffness.across[v] += share * (pair.curvature * (1 - along) + sticking);
-    }
-  }
+  for (const ActivePair& p : active_)
+    add_stiffness(p.vertices, p.count, p.beta, p.normal, p.curvature, 0, normals, stiffness);
+  for (const FrictionPair& p : sliding_)
+    add_stiffness(p.vertices, p.count, p.beta, p.normal, 0, p.limit * p.force_ratio, normals,
+                  stiffness);
 }
 
 void Contact::end_step(const Positions& x) {
   if (!options_.check) return;
   const Stopwatch watch;
+  if (!options_.self && obstacle_now_.rows() == 0) return;
   Positions all(x.rows() + obstacle_now_.rows(), 3);
   all << x, obstacle_now_;
   report_.interpenetrations =

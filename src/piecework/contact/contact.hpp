@@ -3,14 +3,15 @@
 // Contact of cloth with itself and with obstacles during a step: energy, friction, and the limit
 // that keeps anything from passing through anything.
 
-#include <functional>
-#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <piecework/collision/ccd.hpp>
 #include <piecework/collision/surface.hpp>
+#include <piecework/colliders/collider.hpp>
 #include <piecework/contact/activation.hpp>
+#include <piecework/contact/bodies.hpp>
 #include <piecework/contact/near_pairs.hpp>
 #include <piecework/contact/pair_contacts.hpp>
 #include <piecework/model/constraints.hpp>
@@ -33,18 +34,36 @@ struct ContactOptions {
 /// part in several pairs), and rests under its own weight well within the contact distance.
 double default_stiffness(const model::ClothModel& model, double h);
 
-/// Triangle meshes whose motion is prescribed.
-struct Obstacles {
-  Triangles triangles;
-  /// Positions at a time (s), |O| x 3, m.
-  std::function<void(double, Positions&)> place;
-  int num_vertices = 0;
+/// What cloth touches besides itself.
+struct Colliders {
+  std::span<const colliders::AnalyticCollider> bodies;
+  std::span<const colliders::MeshCollider> meshes;
+};
+
+/// Meshes whose motion is prescribed, under one numbering.
+class Obstacles {
+ public:
+  explicit Obstacles(std::span<const colliders::MeshCollider> meshes);
+  [[nodiscard]] const Triangles& triangles() const { return triangles_; }
+  [[nodiscard]] int num_vertices() const { return first_vertex_.back(); }
+  [[nodiscard]] bool are_static() const;
+  /// Positions at a time (s), num_vertices() x 3, m.
+  void place(double time, Positions& x) const;
+  /// The mesh that a vertex belongs to.
+  [[nodiscard]] const colliders::MeshCollider& of_vertex(int v) const;
+  /// The largest contact distance of any, m; 0 without any. \param otherwise  of those without
+  [[nodiscard]] double distance(double otherwise) const;
+
+ private:
+  std::span<const colliders::MeshCollider> meshes_;
+  Triangles triangles_;
+  std::vector<int> first_vertex_;  ///< per mesh, and their number
 };
 
 class Contact final : public model::ContactTerms {
  public:
-  /// \param model  must outlive this object
-  Contact(const model::ClothModel& model, ContactOptions options, Obstacles obstacles);
+  /// \param model, colliders  must outlive this object
+  Contact(const model::ClothModel& model, ContactOptions options, const Colliders& colliders);
 
   void begin_step(const model::StepProblem& problem, double begin, double end) override;
   double start(Positions& x) override;
@@ -54,6 +73,9 @@ class Contact final : public model::ContactTerms {
   double evaluate(const Positions& x, Positions& gradient) override;
   bool renew_friction() override;
   void stiffness(const Positions& normals, model::ContactStiffness& stiffness) const override;
+  void hessian(std::vector<model::ContactBlock>& blocks) const override;
+  /// What touches, in the last evaluate().
+  [[nodiscard]] std::span<const ActivePair> active() const { return active_; }
   [[nodiscard]] bool touching() const override { return !active_.empty(); }
   void end_step(const Positions& x) override;
   [[nodiscard]] const model::ContactReport& report() const override { return report_; }
@@ -67,21 +89,38 @@ class Contact final : public model::ContactTerms {
   /// Shortens the way from the points `from` to `to` and obstacles_end; returns the fraction that
   /// what is held may go.
   double shorten(const Points& from, Positions& to, Positions& obstacles);
-  void find_hits(std::span<const NearPair> pairs, double moved, const Points& from,
+  /// \param moved  PairList::moved(from)
+  void find_hits(const PairList& list, const std::vector<double>& moved, const Points& from,
                  const Points& to, bool first);
   void take_scales();
   void lower_scale(int vertex, double scale);
   void go(const Points& from, Positions& to, Positions& obstacles);
   [[nodiscard]] bool is_held(int v) const;
   void find_active(const Positions& x);
+  void find_active_pairs(std::span<const NearPair> pairs, const Points& points);
+  /// Contact distance and friction of a pair.
+  [[nodiscard]] Activation activation_of(const NearPair& pair) const;
+  [[nodiscard]] double friction_of(const NearPair& pair) const;
+  /// How far a pair has slid since the step began, m.
+  [[nodiscard]] Vec3 slid(const FrictionPair& pair, const Points& points) const;
   double add_friction(const Positions& x, Positions& gradient);
+  void add_block(const collision::PairVertices& vertices, int count,
+                 const std::array<double, 4>& beta, const Mat3& stiffness,
+                 std::vector<model::ContactBlock>& blocks) const;
+  void add_stiffness(const collision::PairVertices& vertices, int count,
+                     const std::array<double, 4>& beta, const Vec3& normal, double pressing,
+                     double sliding, const Positions& normals,
+                     model::ContactStiffness& stiffness) const;
   void add_to_gradient(const collision::PairVertices& vertices, int count,
                        const std::array<Vec3, 4>& forces, Positions& gradient) const;
 
   const model::ClothModel& model_;
   ContactOptions options_;
   Obstacles obstacles_;
+  Bodies bodies_;
+  double slack_;  ///< how far vertices may move until lists are made anew, m
   NearPairs near_;
+  int listed_ = -1;  ///< generation of near_ for which bodies were listed
   Positions rest_obstacles_;
 
   // Of the step.
@@ -93,12 +132,14 @@ class Contact final : public model::ContactTerms {
 
   std::vector<ActivePair> active_;
   std::vector<std::vector<ActivePair>> active_blocks_;
-  std::vector<FrictionPair> friction_;
+  std::vector<FrictionPair> sliding_;  ///< its force_ratio is of the last evaluate()
+  bool has_friction_;
 
   // Of shorten().
   Positions way_, obstacle_way_;
   std::vector<double> scale_, next_scale_;
   std::vector<char> changed_;
+  std::vector<double> moved_;
   double held_scale_ = 1, next_held_scale_ = 1;
   bool held_moves_ = false;
   std::vector<Hit> hits_;

@@ -13,14 +13,29 @@ constexpr std::size_t kPairsPerBlock = 2048;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+void take(const Points& x, Positions& out) {
+  out.resize(x.count(), 3);
+  parallel_for(at(x.count()), [&](std::size_t v) {
+    out.row(static_cast<Eigen::Index>(v)) = x(static_cast<int>(v)).transpose();
+  });
+}
+
 }  // namespace
 
 NearPairs::NearPairs(collision::Surface surface, double reach, double slack)
     : broad_phase_(std::move(surface)), reach_(reach), slack_(slack) {}
 
+void PairList::moved(const Points& x, std::vector<double>& distance) const {
+  distance.resize(at(x.count()));
+  parallel_for(distance.size(), [&](std::size_t v) {
+    distance[v] =
+        (x(static_cast<int>(v)) - made_at.row(static_cast<Eigen::Index>(v)).transpose()).norm();
+  });
+}
+
 void NearPairs::begin() {
   boxes_.clear();
-  made_at_.resize(0, 3);
+  near_.made_at.resize(0, 3);
 }
 
 bool NearPairs::contains(const Points& x) const {
@@ -41,8 +56,8 @@ bool NearPairs::cover(const Points& from, const Points& to) {
     boxes_[v].low = a.cwiseMin(b).array() - slack_;
     boxes_[v].high = a.cwiseMax(b).array() + slack_;
   });
-  list_candidates();
-  made_at_.resize(0, 3);
+  list_candidates(from);
+  near_.made_at.resize(0, 3);
   return true;
 }
 
@@ -56,51 +71,56 @@ collision::PairVertices NearPairs::edge_edge(collision::PairIndex pair) const {
   return {a[0], a[1], b[0], b[1]};
 }
 
-void NearPairs::list_candidates() {
+void NearPairs::list_candidates(const Points& x) {
   const collision::CandidatePairs& found = broad_phase_.find(boxes_, reach_);
   const std::size_t vt = found.vertex_triangle.size();
-  candidates_.resize(vt + found.edge_edge.size());
-  parallel_for(candidates_.size(), [&](std::size_t i) {
+  candidates_.pairs.resize(vt + found.edge_edge.size());
+  parallel_for(candidates_.pairs.size(), [&](std::size_t i) {
     using enum collision::PairKind;
-    candidates_[i] = i < vt
-                         ? NearPair{vertex_triangle(found.vertex_triangle[i]), VertexTriangle, 0}
-                         : NearPair{edge_edge(found.edge_edge[i - vt]), EdgeEdge, 0};
+    NearPair& pair = candidates_.pairs[i];
+    pair = i < vt ? NearPair{vertex_triangle(found.vertex_triangle[i]), VertexTriangle, 0}
+                  : NearPair{edge_edge(found.edge_edge[i - vt]), EdgeEdge, 0};
+    pair.distance = std::sqrt(collision::closest(pair.kind, x(pair.vertices)).distance_sq);
   });
-}
-
-double NearPairs::moved(const Points& x) const {
-  return std::sqrt(parallel_max(at(x.count()), [&](std::size_t v) {
-    return (x(static_cast<int>(v)) - made_at_.row(static_cast<Eigen::Index>(v)).transpose())
-        .squaredNorm();
-  }));
+  take(x, candidates_.made_at);
 }
 
 bool NearPairs::valid_at(const Points& x) const {
-  return made_at_.rows() > 0 && moved(x) <= slack_;
+  if (near_.made_at.rows() == 0) return false;
+  const double farthest_sq = parallel_max(at(x.count()), [&](std::size_t v) {
+    return (x(static_cast<int>(v)) - near_.made_at.row(static_cast<Eigen::Index>(v)).transpose())
+        .squaredNorm();
+  });
+  return farthest_sq <= slack_ * slack_;
 }
 
-std::span<const NearPair> NearPairs::near(const Points& x) {
+const PairList& NearPairs::near(const Points& x) {
   if (valid_at(x)) return near_;
+  ++generation_;
   const double within = reach_ + 2 * slack_;
-  blocks_.resize((candidates_.size() + kPairsPerBlock - 1) / kPairsPerBlock);
+  candidates_.moved(x, moved_);
+  const std::vector<NearPair>& all = candidates_.pairs;
+  blocks_.resize((all.size() + kPairsPerBlock - 1) / kPairsPerBlock);
   parallel_for(
       blocks_.size(),
       [&](std::size_t block) {
         blocks_[block].clear();
-        const std::size_t end = std::min(candidates_.size(), (block + 1) * kPairsPerBlock);
+        const std::size_t end = std::min(all.size(), (block + 1) * kPairsPerBlock);
         for (std::size_t i = block * kPairsPerBlock; i < end; ++i) {
-          NearPair& pair = candidates_[i];
-          pair.distance = std::sqrt(collision::closest(pair.kind, x(pair.vertices)).distance_sq);
+          NearPair pair = all[i];
+          const auto& v = pair.vertices;
+          if (pair.distance - closing_bound(pair.kind, moved_[at(v[0])], moved_[at(v[1])],
+                                            moved_[at(v[2])], moved_[at(v[3])]) >= within)
+            continue;
+          pair.distance = std::sqrt(collision::closest(pair.kind, x(v)).distance_sq);
           if (pair.distance < within) blocks_[block].push_back(pair);
         }
       },
       1);
-  near_.clear();
-  for (const auto& block : blocks_) near_.insert(near_.end(), block.begin(), block.end());
-  made_at_.resize(x.count(), 3);
-  parallel_for(at(x.count()), [&](std::size_t v) {
-    made_at_.row(static_cast<Eigen::Index>(v)) = x(static_cast<int>(v)).transpose();
-  });
+  near_.pairs.clear();
+  for (const auto& block : blocks_)
+    near_.pairs.insert(near_.pairs.end(), block.begin(), block.end());
+  take(x, near_.made_at);
   return near_;
 }
 

@@ -3,6 +3,7 @@
 // Which pairs are worth looking at: those that the broad phase proposes for the whereabouts of a
 // step, and among them those that are near now.
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -34,6 +35,21 @@ struct NearPair {
   double distance;  ///< where the list was made, m
 };
 
+/// Pairs and where they were measured.
+struct PairList {
+  std::vector<NearPair> pairs;
+  Positions made_at;  ///< cloth, then obstacles; empty: no list
+
+  /// How far each vertex is from where the list was made, m.
+  void moved(const Points& x, std::vector<double>& distance) const;
+};
+
+/// By how much two elements may have come closer while their vertices moved by so much each.
+inline double closing_bound(collision::PairKind kind, double a, double b, double c, double d) {
+  return kind == collision::PairKind::VertexTriangle ? a + std::max({b, c, d})
+                                                     : std::max(a, b) + std::max(c, d);
+}
+
 /// A list of near pairs that stays complete while nothing moves far (a Verlet list): valid within
 /// `slack` of where it was made.
 class NearPairs {
@@ -47,17 +63,16 @@ class NearPairs {
   /// The whereabouts of the step from now on contain both; true if the broad phase had to be asked.
   bool cover(const Points& from, const Points& to);
 
-  /// All pairs that can come within `reach` while every vertex stays within the whereabouts, with
-  /// their distances where the last near() made its list.
-  [[nodiscard]] std::span<const NearPair> candidates() const { return candidates_; }
+  /// All pairs that can come within `reach` while every vertex stays within the whereabouts.
+  [[nodiscard]] const PairList& candidates() const { return candidates_; }
 
   /// All pairs that can come within `reach` of each other while no vertex is farther than slack
   /// from where the list was made; made anew at x unless it is valid there.
   /// \pre x is within the whereabouts
-  std::span<const NearPair> near(const Points& x);
+  const PairList& near(const Points& x);
 
-  /// Largest distance of a vertex from where the list of the last near() was made, m.
-  [[nodiscard]] double moved(const Points& x) const;
+  /// Counts the lists that near() has made.
+  [[nodiscard]] int generation() const { return generation_; }
 
   /// The list of the last near() is complete at x too.
   [[nodiscard]] bool valid_at(const Points& x) const;
@@ -68,15 +83,15 @@ class NearPairs {
   [[nodiscard]] collision::PairVertices vertex_triangle(collision::PairIndex pair) const;
   [[nodiscard]] collision::PairVertices edge_edge(collision::PairIndex pair) const;
   [[nodiscard]] bool contains(const Points& x) const;
-  void list_candidates();
+  void list_candidates(const Points& x);
 
   collision::BroadPhase broad_phase_;
   double reach_, slack_;
+  int generation_ = 0;
   std::vector<collision::VertexBox> boxes_;  ///< empty: no whereabouts yet
-  std::vector<NearPair> candidates_;
-  std::vector<NearPair> near_;
+  PairList candidates_, near_;
   std::vector<std::vector<NearPair>> blocks_;  ///< of near_, while it is made
-  Positions made_at_;                          ///< cloth, then obstacles; empty: no list
+  std::vector<double> moved_;
 };
 
 }  // namespace piecework::contact

@@ -19,22 +19,20 @@ constexpr int kLocalRounds = 8;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// Upper bound of how much closer a pair can have come: its motion without the mean of it.
+/// Upper bound of how much closer a pair can come on its way: its motion without the mean of it.
 double closing_bound(collision::PairKind kind, const collision::PairPoints& a,
                      const collision::PairPoints& b) {
   const collision::PairPoints u{b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]};
   const Vec3 mean = 0.25 * (u[0] + u[1] + u[2] + u[3]);
-  std::array<double, 4> s;
-  for (std::size_t i = 0; i < 4; ++i) s[i] = (u[i] - mean).norm();
-  return kind == collision::PairKind::VertexTriangle
-             ? s[0] + std::max({s[1], s[2], s[3]})
-             : std::max(s[0], s[1]) + std::max(s[2], s[3]);
+  return closing_bound(kind, (u[0] - mean).norm(), (u[1] - mean).norm(), (u[2] - mean).norm(),
+                       (u[3] - mean).norm());
 }
 
 }  // namespace
 
-void Contact::find_hits(std::span<const NearPair> pairs, double moved, const Points& from,
+void Contact::find_hits(const PairList& list, const std::vector<double>& moved, const Points& from,
                         const Points& to, bool first) {
+  const std::vector<NearPair>& pairs = list.pairs;
   hit_blocks_.resize((pairs.size() + kPairsPerBlock - 1) / kPairsPerBlock);
   parallel_for(
       hit_blocks_.size(),
@@ -48,7 +46,10 @@ void Contact::find_hits(std::span<const NearPair> pairs, double moved, const Poi
               !changed_[at(v[3])])
             continue;
           const collision::PairPoints a = from(v), b = to(v);
-          if (closing_bound(pair.kind, a, b) < pair.distance - 2 * moved) continue;
+          const double apart =
+              pair.distance - closing_bound(pair.kind, moved[at(v[0])], moved[at(v[1])],
+                                            moved[at(v[2])], moved[at(v[3])]);
+          if (closing_bound(pair.kind, a, b) < apart) continue;
           const collision::CcdResult result =
               collision::first_contact(pair.kind, a, b, options_.ccd);
           if (result.hit) hit_blocks_[block].push_back({i, result.time});
@@ -107,11 +108,10 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
   // Obstacles that stay are both ends of the way at once: keep the first apart from the second.
   const Points end{to, obstacles};
   if (near_.cover(from, end)) report_.cull_ms += watch.lap();
-  (void)near_.near(from);
-  const double moved = near_.moved(from);
-  const std::span<const NearPair> pairs =
-      near_.valid_at(end) ? near_.near(from) : near_.candidates();
-  find_hits(pairs, moved, from, end, true);
+  const bool short_way = near_.valid_at(from) && near_.valid_at(end);
+  const PairList& list = short_way ? near_.near(from) : near_.candidates();
+  list.moved(from, moved_);
+  find_hits(list, moved_, from, end, true);
   held_scale_ = 1;
   if (!hits_.empty()) {
     ++report_.shortened;
@@ -132,7 +132,7 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
     next_held_scale_ = held_scale_;
     if (round < kLocalRounds) {
       for (const Hit& hit : hits_)
-        for (const int v : pairs[hit.pair].vertices) lower_scale(v, kApproach * hit.time);
+        for (const int v : list.pairs[hit.pair].vertices) lower_scale(v, kApproach * hit.time);
     } else {
       double least = 1;
       for (const Hit& hit : hits_) least = std::min(least, hit.time);
@@ -142,7 +142,7 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
     take_scales();
     go(from, to, obstacles);
     if (round >= kLocalRounds) break;
-    find_hits(pairs, moved, from, end, false);
+    find_hits(list, moved_, from, end, false);
   }
   report_.narrow_ms += watch.lap();
   return held_scale_;

@@ -2,6 +2,9 @@
 
 // What minimisers know of contact: its part of the incremental potential, and how far a step may go.
 
+#include <array>
+#include <vector>
+
 #include <piecework/core/types.hpp>
 
 namespace piecework::model {
@@ -12,6 +15,15 @@ struct StepProblem;
 struct ContactStiffness {
   Eigen::VectorXd along;   ///< |V|: in the direction of the vertex' normal
   Eigen::VectorXd across;  ///< |V|: in the others: friction, and contact from aside
+};
+
+/// Second derivative of one contact, positive semidefinite: block (i, j) is
+/// beta_i beta_j stiffness.
+struct ContactBlock {
+  std::array<int, 4> vertices;  ///< of cloth that is not held
+  int count;                    ///< of the vertices in use
+  std::array<double, 4> beta;
+  Mat3 stiffness;  ///< N/m
 };
 
 /// Counts and times of one step.
@@ -62,6 +74,9 @@ class ContactTerms {
 
   /// Of the last evaluate(). \param normals  |V| x 3, unit
   virtual void stiffness(const Positions& normals, ContactStiffness& stiffness) const = 0;
+
+  /// Of the last evaluate(), in a fixed order.
+  virtual void hessian(std::vector<ContactBlock>& blocks) const = 0;
 
   /// Anything is closer than the contact distance, in the last evaluate().
   [[nodiscard]] virtual bool touching() const = 0;

@@ -68,7 +68,8 @@ void Convergence::measure_increment(std::size_t count, const RowSquare& row_sq,
                                     StepReport& report) {
   measure_length(count, row_sq, report);
   error_.add(report.dx_inf);
-  report.error = error_.value(hidden_) * unit_box_ / mean_edge_;
+  const double left = newton_ ? report.dx_inf : error_.value(hidden_);
+  report.error = left * unit_box_ / mean_edge_;
 }
 
 void Convergence::measure_increment(const Unknowns& dx, StepReport& report) {

@@ -47,7 +47,13 @@ class Convergence {
   Convergence(const ClothModel& model, double gravity, StopOptions stop);
 
   /// A new step.
-  void begin() { error_ = {}; }
+  void begin() {
+    error_ = {};
+    newton_ = false;
+  }
+
+  /// Increments are those of Newton's method: what is left after one is less than it was.
+  void assume_newton(bool newton) { newton_ = newton; }
 
   /// Increments that come from K^-1 hide motion along the normals, which K resists
   /// `stiffness_ratio` times too much. 1: nothing is hidden.
@@ -106,6 +112,7 @@ class Convergence {
   double unit_box_;
   double mean_edge_;
   double nodal_weight_;  ///< mean over free vertices, N
+  bool newton_ = false;
   double hidden_ = 0.5;  ///< least ratio of error to increment
   ErrorEstimate error_;
 };

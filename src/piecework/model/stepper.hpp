@@ -57,6 +57,7 @@ struct StepReport {
   int global_solves = 0;
   int evaluations = 0;     ///< of energy and gradient: local passes
   int normal_factors = 0;  ///< factorisations of the metric's normal part
+  int pcg_iterations = 0;  ///< inner iterations of inexact Newton steps
   bool stalled = false;    ///< ended before the stop rule held: rounding allows no more progress
   int degenerate_projections = 0;  ///< triangles that needed the rank-deficient rule
   std::optional<ContactReport> contact;  ///< absent: nothing can touch

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 
 #include <fmt/format.h>
@@ -32,6 +31,11 @@ constexpr double kIterationsPerFactor = 6;
 constexpr int kIterationsPerRefresh = 15;
 /// A step with normals that took no more iterations might have done without.
 constexpr int kEasyIterations = 2;
+/// Newton's direction: the residual that is left of the linear system, and by what factor more
+/// inner iterations than with a fresh metric pay for another one.
+constexpr double kLoosest = 0.5, kTightest = 0.03;
+constexpr double kPcgGrowth = 1.5;
+constexpr int kPcgAllowance = 10;
 constexpr double kLongestWait = 16;  // steps between two attempts without normals
 /// Without normals an error is believed if the gradient allows at most so many times as much...
 constexpr double kBelief = 100;
@@ -90,6 +94,7 @@ std::string DdPd::description() const {
 void DdPd::prepare(const std::vector<char>& fixed) {
   fixed_ = fixed;
   metric_.prepare(fixed);
+  if (newton_) newton_->reset();
   if (options_.sweeps)
     sweeps_ = std::make_unique<local::GaussSeidel>(model_, *domains_, fixed, options_.h,
                                                    *options_.sweeps);
@@ -140,6 +145,7 @@ void DdPd::refresh_normals(model::StepReport& report) {
   acceleration_->metric_changed();
   ++report.normal_factors;
   last_refresh_ = report.iterations;
+  pcg_after_refresh_ = 0;
   gradient_at_refresh_ = report.gradient;
   report.phases.refactor = std::max(0.0, report.phases.refactor) + watch.elapsed_ms();
 }
@@ -149,8 +155,11 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
   if (options_.normals == NormalPart::Never && !touching) return;
   const bool doubtful = convergence_.reached(report) && !believable(report);
   if (report.normal_factors > 0) {
-    static const int per = getenv("PW_REF") ? atoi(getenv("PW_REF")) : kIterationsPerRefresh;
-    if (report.iterations >= last_refresh_ + (touching?per:kIterationsPerRefresh) ||
+    if (newton_proposed_) {
+      if (newton_is_outdated()) refresh_normals(report);
+      return;
+    }
+    if (report.iterations >= last_refresh_ + kIterationsPerRefresh ||
         (doubtful && normals_are_outdated(report)))
       refresh_normals(report);
     return;
@@ -172,6 +181,7 @@ bool DdPd::normals_are_outdated(const model::StepReport& report) const {
 /// E'' >= M / h^2, as it is up to buckling, the minimum is within h^2 M^-1 |grad E|. Where that
 /// says too little, only increments in the metric with normals, which is soft where E is, count.
 bool DdPd::believable(const model::StepReport& report) const {
+  if (newton_proposed_) return true;
   if (options_.normals == NormalPart::Never || options_.stop.rule != model::StopRule::Error)
     return true;
   const double farthest = options_.h * options_.h * options_.gravity * report.gradient;
@@ -200,8 +210,50 @@ void DdPd::find_moved() {
   });
 }
 
+bool DdPd::wants_newton() const {
+  return options_.newton == NewtonUse::Touching && contact_ && contact_->touching() &&
+         !sweeps_ && !newton_failed_;
+}
+
+bool DdPd::newton_is_outdated() const {
+  return pcg_after_refresh_ > 0 &&
+         pcg_iterations_ > kPcgGrowth * pcg_after_refresh_ + kPcgAllowance;
+}
+
+/// Tighter as the gradient falls faster, which says that the second derivative is believed to the
+/// end [Eisenstat and Walker 1996, choice 2].
+double DdPd::forcing(double gradient) {
+  const double ratio = newton_gradient_ > 0 ? gradient / newton_gradient_ : 1;
+  newton_gradient_ = gradient;
+  return std::clamp(0.9 * ratio * ratio, kTightest, kLoosest);
+}
+
+void DdPd::propose(const model::StepProblem& problem, model::StepReport& report) {
+  newton_proposed_ = wants_newton();
+  if (!newton_proposed_) {
+    acceleration_->propose(now_.g, metric_, d_);
+    ++report.global_solves;
+    return;
+  }
+  if (!newton_) newton_ = std::make_unique<InexactNewton>(model_);
+  newton_->assemble(now_.x, problem, metric_, contact_);
+  pcg_iterations_ = newton_->solve(now_.g, forcing(report.gradient), metric_, d_);
+  if (pcg_after_refresh_ == 0) pcg_after_refresh_ = std::max(1, pcg_iterations_);
+  report.pcg_iterations += pcg_iterations_;
+  report.global_solves += pcg_iterations_ + 1;
+  acceleration_->restart();
+}
+
+bool DdPd::renew_friction(const model::StepProblem& problem, model::StepReport& report) {
+  if (!contact_ || !contact_->renew_friction()) return false;
+  evaluate(now_, problem, report);
+  acceleration_->restart();
+  return true;
+}
+
 void DdPd::accept(const Positions& moved, double scale, double step, model::StepReport& report) {
-  acceleration_->accept(scale, moved, now_.g, trial_.g);
+  if (!newton_proposed_) acceleration_->accept(scale, moved, now_.g, trial_.g);
+  convergence_.assume_newton(newton_proposed_);
   convergence_.assume_stiffness_ratio(metric_.normals_in_use() ? 1.0 : stiffness_ratio_);
   // What contact cut off is still to be done.
   convergence_.measure_increment(sweeps_ ? moved : d_, sweeps_ ? scale : step, report);
@@ -209,7 +261,8 @@ void DdPd::accept(const Positions& moved, double scale, double step, model::Step
 }
 
 bool DdPd::line_search(const model::StepProblem& problem, double slope, model::StepReport& report) {
-  const bool may_shorten = acceleration_->scalable() || acceleration_->fresh();
+  const bool may_shorten =
+      newton_proposed_ || acceleration_->scalable() || acceleration_->fresh();
   double step = 1;
   for (int k = 0; k < (may_shorten ? kMaxBacktracks : 1); ++k) {
     metric_.reduction().advance(now_.x, step, d_, trial_.x);
@@ -247,10 +300,14 @@ bool DdPd::move(const model::StepProblem& problem, model::StepReport& report) {
   };
   for (;;) {
     const bool fresh = acceleration_->fresh();
-    acceleration_->propose(now_.g, metric_, d_);
-    ++report.global_solves;
+    propose(problem, report);
     const double slope = dot(now_.g, d_);
     if (slope < 0 && line_search(problem, slope, report)) return finish(true);
+    if (contact_) evaluate(now_, problem, report);  // contact speaks of its last evaluation
+    if (newton_proposed_) {
+      newton_failed_ = true;
+      continue;
+    }
     // What was remembered misled. -P g leads down unless rounding is all that is left, or P is not
     // positive definite: nothing has checked the 32-bit factor of Kn, which K's may outlive.
     if (fresh && !metric_.normals_in_use()) return finish(false);
@@ -271,6 +328,9 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   acceleration_->restart();
   metric_.drop_normals();
   contact_ = problem.contact;
+  newton_proposed_ = newton_failed_ = false;
+  newton_gradient_ = 0;
+  int renewals = options_.friction_renewals;
   choose_start(problem, x, report);
   convergence_.measure_gradient(now_.g, report);
   report.energy = now_.energy;
@@ -296,6 +356,8 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
     report.energy = now_.energy;
     go_on = problem.observe(report, now_.x);
     report.converged = convergence_.reached(report) && believable(report);
+    if (report.converged && renewals-- > 0 && renew_friction(problem, report))
+      report.converged = false;
     report.stalled = !report.converged && ++without_progress_ > kPatience;
   }
   report.degenerate_projections = now_.degenerate;

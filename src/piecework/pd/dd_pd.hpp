@@ -12,6 +12,7 @@
 #include <piecework/model/convergence.hpp>
 #include <piecework/model/stepper.hpp>
 #include <piecework/pd/acceleration.hpp>
+#include <piecework/pd/inexact_newton.hpp>
 #include <piecework/pd/metric.hpp>
 
 namespace piecework::pd {
@@ -25,12 +26,20 @@ enum class NormalPart {
   Always,
 };
 
+/// When Newton's direction takes the place of the accelerated one (InexactNewton).
+enum class NewtonUse {
+  Never,
+  Touching,  ///< while anything touches
+};
+
 struct DdPdOptions {
   double h = 1.0 / 120.0;  ///< s
   double gravity = 9.81;   ///< magnitude that turns forces into weights for `gradient`, m/s^2
   model::StopOptions stop;
   AccelerationOptions acceleration;
   NormalPart normals = NormalPart::Automatic;
+  NewtonUse newton = NewtonUse::Touching;
+  int friction_renewals = 1;  ///< times that a converged step takes up the pressure it has found
   /// Sweeps over the constraints of each domain before they are projected together [Lu25, Sec. 5];
   /// absent: constraint-parallel projections only. SweepForm::LiteralEq12 may raise E and is taken
   /// as it is, so it goes with AccelerationKind::None.
@@ -76,6 +85,12 @@ class DdPd final : public model::Minimizer {
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
   [[nodiscard]] double detection_ms() const;
+  [[nodiscard]] bool wants_newton() const;
+  [[nodiscard]] bool newton_is_outdated() const;
+  double forcing(double gradient);
+  /// Fills d_.
+  void propose(const model::StepProblem& problem, model::StepReport& report);
+  bool renew_friction(const model::StepProblem& problem, model::StepReport& report);
   void find_moved();
   void advance_held(const model::StepProblem& problem, model::StepReport& report);
   [[nodiscard]] bool normals_are_outdated(const model::StepReport& report) const;
@@ -89,6 +104,12 @@ class DdPd final : public model::Minimizer {
   std::vector<char> fixed_;
   Metric metric_;
   std::unique_ptr<Acceleration> acceleration_;
+  std::unique_ptr<InexactNewton> newton_;  ///< absent until first wanted
+  bool newton_proposed_ = false;           ///< d_ is Newton's direction
+  bool newton_failed_ = false;             ///< the last one led nowhere
+  double newton_gradient_ = 0;             ///< where the last one started; 0: none in this step
+  int pcg_iterations_ = 0;                 ///< of the last direction
+  int pcg_after_refresh_ = 0;              ///< of the first one with this metric; 0: none yet
   local::JacobiStep local_;
   const decomposition::Decomposition* domains_;
   std::unique_ptr<local::GaussSeidel> sweeps_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <cstdlib>
 #include <utility>
 
 #include <fmt/format.h>
@@ -128,7 +127,7 @@ bool Metric::refresh_normals(const Positions& x, const model::ContactTerms* cont
   normal_->find_normals(x);
   along_.resize(0);
   across_.resize(0);
-  if (contact && !getenv("PW_NOD")) { find_contact(*contact); if(getenv("PW_DS")) {along_*=atof(getenv("PW_DS"));across_*=atof(getenv("PW_DS"));} if (getenv("PW_NOACROSS")) across_.setZero(); }
+  if (contact) find_contact(*contact);
   factor_with(across_);
   normals_in_use_ = normal_solver_.factor(normal_->assemble(x, along_)) == global::SolveStatus::Ok;
   return normals_in_use_;
@@ -158,7 +157,7 @@ void Metric::apply(const Positions& g, Positions& d) {
   d.resize(g.rows(), 3);
   if (!normals_in_use_) return solve_stretch(g, d);
   const auto N = normal_->normals();
-  const bool touching = along_.size() > 0 && !getenv("PW_NOS");
+  const bool touching = along_.size() > 0;
   if (touching) {
     tangential_ = g;
     remove_normals(tangential_);

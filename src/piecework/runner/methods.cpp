@@ -162,7 +162,9 @@ std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
 
 std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
   const scene::Scene& scene = world.scene;
-  if (!scene.self_collision) return nullptr;
+  static std::vector<colliders::AnalyticCollider> bodies;
+  if (getenv("PW_SPHERE") && bodies.empty()) bodies.emplace_back(colliders::Traits{"ball",{},{}}, colliders::Sphere{Vec3::Zero(),0.3}, Eigen::Isometry3d::Identity(), colliders::RigidMotion{});
+  if (!scene.self_collision && bodies.empty()) return nullptr;
   contact::ContactOptions options;
   options.h = scene.step.h;
   options.self = scene.self_collision;
@@ -175,7 +177,7 @@ std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
   options.ccd.method =
       scene.quality.ccd == "newton" ? collision::CcdMethod::Newton : collision::CcdMethod::Halley;
   options.check = scene.contact.check;
-  return std::make_unique<contact::Contact>(world.model, options, contact::Obstacles{});
+  return std::make_unique<contact::Contact>(world.model, options, contact::Colliders{bodies,{}});
 }
 
 std::unique_ptr<model::Integrator> make_integrator(const World& world) {

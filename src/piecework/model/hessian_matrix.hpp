@@ -11,7 +11,7 @@
 #include <piecework/model/reduction.hpp>
 #include <piecework/model/stepper.hpp>
 
-namespace piecework::baselines {
+namespace piecework::model {
 
 /// H = K~ (x) I_3 - T_f^T (softening of triangles and curved hinges) T_f, n_f x n_f blocks of 3 x
 /// 3, N/m. Projected, it lies between M / h^2 and K~ (x) I_3, so it is positive definite.
@@ -21,13 +21,13 @@ namespace piecework::baselines {
 class HessianMatrix {
  public:
   /// \param model  must outlive this object
-  explicit HessianMatrix(const model::ClothModel& model);
+  explicit HessianMatrix(const ClothModel& model);
 
   /// Takes the pattern: who contributes where. \param system  K~ of `reduction`
-  void set_pattern(const model::Reduction& reduction, SparseMatrix system);
+  void set_pattern(const Reduction& reduction, SparseMatrix system);
 
   /// Evaluates at x (|V| x 3, m).
-  void assemble(const Positions& x, const model::StepProblem& problem, model::HessianForm form);
+  void assemble(const Positions& x, const StepProblem& problem, HessianForm form);
 
   /// Number of block rows, n_f.
   [[nodiscard]] int count() const { return static_cast<int>(system_.cols()); }
@@ -60,20 +60,20 @@ class HessianMatrix {
   };
 
   [[nodiscard]] int entry(int row, int column) const;
-  void add_pair(const model::Reduction& reduction, int row_vertex, int column_vertex, Use use,
+  void add_pair(const Reduction& reduction, int row_vertex, int column_vertex, Use use,
                 std::vector<Addition>& additions) const;
   [[nodiscard]] Uses sorted(const std::vector<Addition>& additions) const;
   void make_scalar_pattern();
   [[nodiscard]] Mat3 gathered(std::size_t k) const;
 
-  const model::ClothModel& model_;
+  const ClothModel& model_;
   std::vector<int> curved_;  ///< bending constraints with a curved rest shape
   SparseMatrix system_;
   Uses triangle_uses_, hinge_uses_;
-  std::vector<model::StretchSoftening> stretch_;  ///< per triangle
+  std::vector<StretchSoftening> stretch_;  ///< per triangle
   std::vector<Mat3> bend_;                        ///< per curved hinge
   std::vector<Mat3> blocks_;
   SparseMatrix scalars_;
 };
 
-}  // namespace piecework::baselines
+}  // namespace piecework::model

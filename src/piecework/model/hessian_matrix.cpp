@@ -1,4 +1,4 @@
-#include <piecework/baselines/hessian_matrix.hpp>
+#include <piecework/model/hessian_matrix.hpp>
 
 #include <algorithm>
 #include <numeric>
@@ -8,9 +8,9 @@
 #include <piecework/core/parallel.hpp>
 #include <piecework/model/projection.hpp>
 
-namespace piecework::baselines {
+namespace piecework::model {
 
-HessianMatrix::HessianMatrix(const model::ClothModel& model)
+HessianMatrix::HessianMatrix(const ClothModel& model)
     : model_(model), stretch_(model.stretch.size()) {
   for (std::size_t i = 0; i < model.bend.size(); ++i)
     if (model.bend[i].rest_length > 0) curved_.push_back(static_cast<int>(i));
@@ -25,7 +25,7 @@ int HessianMatrix::entry(int row, int column) const {
   return static_cast<int>(found - system_.innerIndexPtr());
 }
 
-void HessianMatrix::add_pair(const model::Reduction& reduction, int row_vertex, int column_vertex,
+void HessianMatrix::add_pair(const Reduction& reduction, int row_vertex, int column_vertex,
                              Use use, std::vector<Addition>& additions) const {
   const mesh::SeamMap& seams = model_.sewing.map();
   seams.visit_carriers(column_vertex, [&](int c, double c_weight) {
@@ -51,7 +51,7 @@ HessianMatrix::Uses HessianMatrix::sorted(const std::vector<Addition>& additions
   return uses;
 }
 
-void HessianMatrix::set_pattern(const model::Reduction& reduction, SparseMatrix system) {
+void HessianMatrix::set_pattern(const Reduction& reduction, SparseMatrix system) {
   system_ = std::move(system);
   system_.makeCompressed();
   std::vector<Addition> additions;
@@ -90,18 +90,18 @@ Mat3 HessianMatrix::gathered(std::size_t k) const {
   return block;
 }
 
-void HessianMatrix::assemble(const Positions& x, const model::StepProblem& problem,
-                             model::HessianForm form) {
+void HessianMatrix::assemble(const Positions& x, const StepProblem& problem,
+                             HessianForm form) {
   parallel_for(stretch_.size(), [&](std::size_t t) {
-    const model::StretchConstraint& c = model_.stretch[t];
-    const Mat32 F = model::deformation_gradient(c, x);
+    const StretchConstraint& c = model_.stretch[t];
+    const Mat32 F = deformation_gradient(c, x);
     Mat32 R;
-    model::project_stretch(c, F, *problem.previous, model_.start, R);
-    stretch_[t] = model::stretch_softening(c, F, R, form);
+    project_stretch(c, F, *problem.previous, model_.start, R);
+    stretch_[t] = stretch_softening(c, F, R, form);
   });
   parallel_for(bend_.size(), [&](std::size_t i) {
     const auto& c = model_.bend[static_cast<std::size_t>(curved_[i])];
-    bend_[i] = model::bend_softening(c, x, form);
+    bend_[i] = bend_softening(c, x, form);
   });
   parallel_for(blocks_.size(), [&](std::size_t k) { blocks_[k] = gathered(k); });
 }
@@ -151,4 +151,4 @@ const SparseMatrix& HessianMatrix::scalars() {
   return scalars_;
 }
 
-}  // namespace piecework::baselines
+}  // namespace piecework::model

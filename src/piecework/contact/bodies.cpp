@@ -1,0 +1,139 @@
+#include <piecework/contact/bodies.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include <piecework/core/parallel.hpp>
+
+namespace piecework::contact {
+namespace {
+
+constexpr std::size_t kVerticesPerBlock = 2048;
+/// Of the way to a body; the rest keeps a gap.
+constexpr double kApproach = 0.9;
+/// Of the contact distance: nearer than this counts as touching when a way is followed.
+constexpr double kTouching = 1e-3;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+Bodies::Bodies(std::span<const colliders::AnalyticCollider> colliders, const Activation& activation,
+               std::optional<double> friction)
+    : colliders_(colliders), activation_(activation), friction_(friction) {}
+
+double Bodies::distance(int body) const {
+  return colliders_[at(body)].traits().thickness.value_or(activation_.distance);
+}
+
+void Bodies::begin_step(double begin, double end) {
+  begin_.clear();
+  end_.clear();
+  for (const auto& collider : colliders_) {
+    begin_.push_back(collider.pose(begin));
+    end_.push_back(collider.pose(end));
+  }
+}
+
+/// The distance changes by no more than the way: steps as long as it is cannot pass through.
+double Bodies::free_part(int body, const Vec3& from, const Vec3& way,
+                         const Eigen::Isometry3d& pose) const {
+  constexpr int kMaxSteps = 64;
+  const double length = way.norm();
+  const double touching = kTouching * distance(body);
+  const auto& collider = colliders_[at(body)];
+  double d = collider.signed_distance(from, pose).distance;
+  if (!(d > touching) || length <= d - touching) return 1;  // inside: may go anywhere
+  double t = 0;
+  for (int k = 0; k < kMaxSteps && d > touching; ++k) {
+    t += (d - 0.5 * touching) / length;
+    if (t >= 1) return 1;
+    d = collider.signed_distance(from + t * way, pose).distance;
+  }
+  return kApproach * t;
+}
+
+void Bodies::start(const Positions& previous, const std::vector<char>& held, Positions& x) const {
+  for (int body = 0; body < static_cast<int>(colliders_.size()); ++body) {
+    const Eigen::Isometry3d carry = end_[at(body)] * begin_[at(body)].inverse();
+    parallel_for(at(static_cast<int>(x.rows())), [&](std::size_t v) {
+      if (held[v]) return;
+      const auto row = static_cast<Eigen::Index>(v);
+      // In the frame of the body at its end.
+      const Vec3 from = carry * Vec3(previous.row(row).transpose());
+      const Vec3 way = x.row(row).transpose() - from;
+      const double part = free_part(body, from, way, end_[at(body)]);
+      if (part < 1) x.row(row) = (from + part * way).transpose();
+    });
+  }
+}
+
+bool Bodies::limit(const Positions& from, const std::vector<char>& held, Positions& to) const {
+  double shortened = 0;
+  for (int body = 0; body < static_cast<int>(colliders_.size()); ++body)
+    shortened += parallel_sum<double>(at(static_cast<int>(to.rows())), [&](std::size_t v) {
+      if (held[v]) return 0.0;
+      const auto row = static_cast<Eigen::Index>(v);
+      const Vec3 begin = from.row(row).transpose();
+      const Vec3 way = to.row(row).transpose() - begin;
+      const double part = free_part(body, begin, way, end_[at(body)]);
+      if (part == 1) return 0.0;
+      to.row(row) = (begin + part * way).transpose();
+      return 1.0;
+    });
+  return shortened > 0;
+}
+
+void Bodies::list(const Positions& x, double slack) {
+  near_.clear();
+  const auto count = at(static_cast<int>(x.rows()));
+  for (int body = 0; body < static_cast<int>(colliders_.size()); ++body) {
+    const double reach = distance(body) + 2 * slack;
+    blocks_.resize((count + kVerticesPerBlock - 1) / kVerticesPerBlock);
+    parallel_for(
+        blocks_.size(),
+        [&](std::size_t block) {
+          blocks_[block].clear();
+          const std::size_t end = std::min(count, (block + 1) * kVerticesPerBlock);
+          for (std::size_t v = block * kVerticesPerBlock; v < end; ++v) {
+            const Vec3 p = x.row(static_cast<Eigen::Index>(v)).transpose();
+            const double d = colliders_[at(body)].signed_distance(p, end_[at(body)]).distance;
+            if (d < reach) blocks_[block].push_back({static_cast<int>(v), body, !(d > 0)});
+          }
+        },
+        1);
+    for (const auto& block : blocks_) near_.insert(near_.end(), block.begin(), block.end());
+  }
+}
+
+void Bodies::activate(const Positions& x, std::vector<ActivePair>& active) const {
+  for (const NearBody& near : near_) {
+    const auto& collider = colliders_[at(near.body)];
+    const auto at_vertex =
+        collider.signed_distance(x.row(near.vertex).transpose(), end_[at(near.body)]);
+    Activation activation = activation_;
+    activation.distance = distance(near.body);
+    if (!(at_vertex.distance < activation.distance)) continue;
+    if (near.inside || !(at_vertex.distance > 0)) activation.barrier = Barrier::None;
+    const ActivationValue b = activation(at_vertex.distance);
+    ActivePair pair;
+    pair.vertices = {near.vertex, near.body, -1, -1};
+    pair.count = 1;
+    pair.beta = {1, 0, 0, 0};
+    pair.normal = at_vertex.normal;
+    pair.energy = b.energy;
+    pair.pressure = -b.slope;
+    pair.curvature = b.curvature;
+    pair.gradient.fill(Vec3::Zero());
+    pair.gradient[0] = b.slope * at_vertex.normal;
+    pair.friction = collider.traits().friction.value_or(friction_.value_or(0));
+    active.push_back(pair);
+  }
+}
+
+Vec3 Bodies::unslid(const ActivePair& pair, const Vec3& previous) const {
+  const auto body = at(pair.vertices[1]);
+  return end_[body] * (begin_[body].inverse() * previous);
+}
+
+}  // namespace piecework::contact

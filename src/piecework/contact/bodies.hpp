@@ -1,0 +1,64 @@
+#pragma once
+
+// Contact of single vertices with bodies that have a closed form.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <piecework/colliders/collider.hpp>
+#include <piecework/contact/activation.hpp>
+#include <piecework/contact/pair_contacts.hpp>
+
+namespace piecework::contact {
+
+/// A vertex near a body.
+struct NearBody {
+  int vertex;
+  int body;
+  /// It was inside when the step began: pushed out by a parabola, since a barrier has no inside.
+  bool inside;
+};
+
+/// The bodies of a step: where they are at its begin and end.
+class Bodies {
+ public:
+  /// \param colliders  must outlive this object
+  Bodies(std::span<const colliders::AnalyticCollider> colliders, const Activation& activation,
+         std::optional<double> friction);
+
+  [[nodiscard]] bool empty() const { return colliders_.empty(); }
+
+  void begin_step(double begin, double end);
+
+  /// Cuts the ways of vertices from where the step began (bodies at its begin) to x (bodies at its
+  /// end) short of the bodies, seen from each body: vertices are carried along. What is held stays.
+  void start(const Positions& previous, const std::vector<char>& held, Positions& x) const;
+
+  /// Cuts straight ways short of the bodies at the step's end; true if any was.
+  bool limit(const Positions& from, const std::vector<char>& held, Positions& to) const;
+
+  /// Lists the vertices that come within contact while nothing moves farther than `slack` from x.
+  void list(const Positions& x, double slack);
+
+  /// Adds contacts at x to `active`, in the order of the list.
+  void activate(const Positions& x, std::vector<ActivePair>& active) const;
+
+  /// Where the point of its body was, when the step began, that is now at the vertex' old place: a
+  /// vertex that has moved to there has not slid. \param pair  with count 1
+  [[nodiscard]] Vec3 unslid(const ActivePair& pair, const Vec3& previous) const;
+
+ private:
+  [[nodiscard]] double distance(int body) const;
+  [[nodiscard]] double free_part(int body, const Vec3& from, const Vec3& way,
+                                 const Eigen::Isometry3d& pose) const;
+
+  std::span<const colliders::AnalyticCollider> colliders_;
+  Activation activation_;
+  std::optional<double> friction_;
+  std::vector<Eigen::Isometry3d> begin_, end_;
+  std::vector<NearBody> near_;
+  std::vector<std::vector<NearBody>> blocks_;
+};
+
+}  // namespace piecework::contact

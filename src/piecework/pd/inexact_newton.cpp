@@ -1,0 +1,87 @@
+#include <piecework/pd/inexact_newton.hpp>
+
+#include <piecework/core/parallel.hpp>
+#include <piecework/pd/acceleration.hpp>
+
+namespace piecework::pd {
+namespace {
+
+/// a += factor b.
+void add(Positions& a, double factor, const Positions& b) {
+  parallel_for(static_cast<std::size_t>(a.rows()), [&](std::size_t i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    a.row(row) += factor * b.row(row);
+  });
+}
+
+/// a = b + factor a.
+void add_onto(Positions& a, double factor, const Positions& b) {
+  parallel_for(static_cast<std::size_t>(a.rows()), [&](std::size_t i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    a.row(row) = b.row(row) + factor * a.row(row);
+  });
+}
+
+}  // namespace
+
+void InexactNewton::assemble(const Positions& x, const model::StepProblem& problem,
+                             const Metric& metric, const model::ContactTerms* contact) {
+  if (!reduction_) {
+    reduction_ = &metric.reduction();
+    hessian_.set_pattern(*reduction_, reduction_->system(metric.K()));
+  }
+  hessian_.assemble(x, problem, model::HessianForm::Projected);
+  blocks_.clear();
+  if (contact) contact->hessian(blocks_);
+}
+
+void InexactNewton::add_contact(const Positions& d, Positions& product) {
+  moved_.setZero(model_.num_vertices(), 3);
+  reduction_->advance(moved_, 1, d, force_);  // T_f d
+  std::swap(moved_, force_);
+  force_.setZero(model_.num_vertices(), 3);
+  for (const model::ContactBlock& block : blocks_) {
+    Vec3 relative = Vec3::Zero();
+    for (int k = 0; k < block.count; ++k)
+      relative += block.beta[static_cast<std::size_t>(k)] *
+                  moved_.row(block.vertices[static_cast<std::size_t>(k)]).transpose();
+    const Eigen::RowVector3d force = (block.stiffness * relative).transpose();
+    for (int k = 0; k < block.count; ++k)
+      force_.row(block.vertices[static_cast<std::size_t>(k)]) +=
+          block.beta[static_cast<std::size_t>(k)] * force;
+  }
+  reduction_->gather(force_, folded_);
+  add(product, 1, folded_);
+}
+
+void InexactNewton::multiply(const Positions& d, Positions& product) {
+  hessian_.multiply(d, product);
+  if (!blocks_.empty()) add_contact(d, product);
+}
+
+int InexactNewton::solve(const Positions& g, double forcing, Metric& metric, Positions& d) {
+  d.setZero(g.rows(), 3);
+  residual_ = -g;
+  metric.apply(residual_, preconditioned_);
+  direction_ = preconditioned_;
+  double norm_sq = dot(residual_, preconditioned_);
+  const double enough = forcing * forcing * norm_sq;
+  int iterations = 0;
+  while (iterations < kMaxIterations && norm_sq > enough) {
+    multiply(direction_, product_);
+    const double curvature = dot(direction_, product_);
+    if (!(curvature > 0)) break;  // only rounding is left
+    const double step = norm_sq / curvature;
+    add(d, step, direction_);
+    add(residual_, -step, product_);
+    ++iterations;
+    metric.apply(residual_, preconditioned_);
+    const double next_sq = dot(residual_, preconditioned_);
+    add_onto(direction_, next_sq / norm_sq, preconditioned_);
+    norm_sq = next_sq;
+  }
+  if (iterations == 0) d = direction_;
+  return iterations;
+}
+
+}  // namespace piecework::pd

@@ -1,0 +1,50 @@
+#pragma once
+
+// Newton's direction by conjugate gradients in the engine's metric.
+//
+// L-BFGS learns what the metric does not know from the way that the iterates take. Where cloth
+// touches, that way has kinks, and each of its points costs a detection: there the second
+// derivative itself, with the exact coupling of what touches, is the cheaper teacher.
+
+#include <vector>
+
+#include <piecework/model/contact_terms.hpp>
+#include <piecework/model/hessian_matrix.hpp>
+#include <piecework/pd/metric.hpp>
+
+namespace piecework::pd {
+
+/// Solves H d = -g inexactly [Dembo, Eisenstat and Steihaug 1982]: H is the projected second
+/// derivative of the incremental potential, contact and friction included, so positive definite;
+/// the metric preconditions. Same bits for every number of threads.
+class InexactNewton {
+ public:
+  /// \param model  must outlive this object
+  explicit InexactNewton(const model::ClothModel& model) : hessian_(model), model_(model) {}
+
+  /// Forgets the pattern: other vertices are held.
+  void reset() { reduction_ = nullptr; }
+
+  /// H at x (|V| x 3, m). \param contact  as evaluated there, or null
+  void assemble(const Positions& x, const model::StepProblem& problem, const Metric& metric,
+                const model::ContactTerms* contact);
+
+  /// d = -H^-1 g until the residual's norm in the metric has fallen by `forcing`, or after
+  /// kMaxIterations; n_f x 3. Returns the iterations. d leads down whatever they are, above 0.
+  int solve(const Positions& g, double forcing, Metric& metric, Positions& d);
+
+ private:
+  static constexpr int kMaxIterations = 200;
+
+  void multiply(const Positions& d, Positions& product);
+  void add_contact(const Positions& d, Positions& product);
+
+  model::HessianMatrix hessian_;
+  const model::ClothModel& model_;
+  const model::Reduction* reduction_ = nullptr;  ///< the one that hessian_ has its pattern from
+  std::vector<model::ContactBlock> blocks_;
+  Positions residual_, preconditioned_, direction_, product_;
+  Positions moved_, force_, folded_;  ///< |V| x 3, |V| x 3, n_f x 3: products with contact
+};
+
+}  // namespace piecework::pd
