@@ -20,8 +20,8 @@ constexpr int kLocalRounds = 8;
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 /// Upper bound of how much closer a pair can come on its way: its motion without the mean of it.
-double closing_bound(collision::PairKind kind, const collision::PairPoints& a,
-                     const collision::PairPoints& b) {
+double closing_on_way(collision::PairKind kind, const collision::PairPoints& a,
+                      const collision::PairPoints& b) {
   const collision::PairPoints u{b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]};
   const Vec3 mean = 0.25 * (u[0] + u[1] + u[2] + u[3]);
   return closing_bound(kind, (u[0] - mean).norm(), (u[1] - mean).norm(), (u[2] - mean).norm(),
@@ -49,7 +49,7 @@ void Contact::find_hits(const PairList& list, const std::vector<double>& moved, 
           const double apart =
               pair.distance - closing_bound(pair.kind, moved[at(v[0])], moved[at(v[1])],
                                             moved[at(v[2])], moved[at(v[3])]);
-          if (closing_bound(pair.kind, a, b) < apart) continue;
+          if (closing_on_way(pair.kind, a, b) < apart) continue;
           const collision::CcdResult result =
               collision::first_contact(pair.kind, a, b, options_.ccd);
           if (result.hit) hit_blocks_[block].push_back({i, result.time});
