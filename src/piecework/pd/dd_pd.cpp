@@ -31,9 +31,8 @@ constexpr double kIterationsPerFactor = 6;
 constexpr int kIterationsPerRefresh = 15;
 /// A step with normals that took no more iterations might have done without.
 constexpr int kEasyIterations = 2;
-/// Newton's direction: the residual that is left of the linear system, and by what factor more
-/// inner iterations than with a fresh metric pay for another one.
-constexpr double kLoosest = 0.5, kTightest = 0.03;
+/// Newton's direction: by what factor more inner iterations than with a fresh metric pay for
+/// another one.
 constexpr double kPcgGrowth = 1.5;
 constexpr int kPcgAllowance = 10;
 constexpr double kLongestWait = 16;  // steps between two attempts without normals
@@ -220,14 +219,6 @@ bool DdPd::newton_is_outdated() const {
          pcg_iterations_ > kPcgGrowth * pcg_after_refresh_ + kPcgAllowance;
 }
 
-/// Tighter as the gradient falls faster, which says that the second derivative is believed to the
-/// end [Eisenstat and Walker 1996, choice 2].
-double DdPd::forcing(double gradient) {
-  const double ratio = newton_gradient_ > 0 ? gradient / newton_gradient_ : 1;
-  newton_gradient_ = gradient;
-  return std::clamp(0.9 * ratio * ratio, kTightest, kLoosest);
-}
-
 void DdPd::propose(const model::StepProblem& problem, model::StepReport& report) {
   newton_proposed_ = wants_newton();
   if (!newton_proposed_) {
@@ -237,7 +228,7 @@ void DdPd::propose(const model::StepProblem& problem, model::StepReport& report)
   }
   if (!newton_) newton_ = std::make_unique<InexactNewton>(model_);
   newton_->assemble(now_.x, problem, metric_, contact_);
-  pcg_iterations_ = newton_->solve(now_.g, forcing(report.gradient), metric_, d_);
+  pcg_iterations_ = newton_->solve(now_.g, metric_, d_);
   if (pcg_after_refresh_ == 0) pcg_after_refresh_ = std::max(1, pcg_iterations_);
   report.pcg_iterations += pcg_iterations_;
   report.global_solves += pcg_iterations_ + 1;
@@ -329,7 +320,7 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   metric_.drop_normals();
   contact_ = problem.contact;
   newton_proposed_ = newton_failed_ = false;
-  newton_gradient_ = 0;
+  if (newton_) newton_->begin();
   int renewals = options_.friction_renewals;
   choose_start(problem, x, report);
   convergence_.measure_gradient(now_.g, report);

@@ -87,7 +87,6 @@ class DdPd final : public model::Minimizer {
   [[nodiscard]] double detection_ms() const;
   [[nodiscard]] bool wants_newton() const;
   [[nodiscard]] bool newton_is_outdated() const;
-  double forcing(double gradient);
   /// Fills d_.
   void propose(const model::StepProblem& problem, model::StepReport& report);
   bool renew_friction(const model::StepProblem& problem, model::StepReport& report);
@@ -107,7 +106,6 @@ class DdPd final : public model::Minimizer {
   std::unique_ptr<InexactNewton> newton_;  ///< absent until first wanted
   bool newton_proposed_ = false;           ///< d_ is Newton's direction
   bool newton_failed_ = false;             ///< the last one led nowhere
-  double newton_gradient_ = 0;             ///< where the last one started; 0: none in this step
   int pcg_iterations_ = 0;                 ///< of the last direction
   int pcg_after_refresh_ = 0;              ///< of the first one with this metric; 0: none yet
   local::JacobiStep local_;

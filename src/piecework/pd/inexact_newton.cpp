@@ -1,10 +1,15 @@
 #include <piecework/pd/inexact_newton.hpp>
 
+#include <algorithm>
+
 #include <piecework/core/parallel.hpp>
 #include <piecework/pd/acceleration.hpp>
 
 namespace piecework::pd {
 namespace {
+
+/// The residual that is left of the linear system.
+constexpr double kLoosest = 0.5, kTightest = 0.1;
 
 /// a += factor b.
 void add(Positions& a, double factor, const Positions& b) {
@@ -59,13 +64,23 @@ void InexactNewton::multiply(const Positions& d, Positions& product) {
   if (!blocks_.empty()) add_contact(d, product);
 }
 
-int InexactNewton::solve(const Positions& g, double forcing, Metric& metric, Positions& d) {
+/// Tighter as the gradient falls faster, which says that the second derivative is believed to the
+/// end [Eisenstat and Walker 1996, choice 2]. In the norm of the metric: the plain one is not
+/// monotone.
+double InexactNewton::forcing(double norm_sq) {
+  const double ratio_sq = last_norm_sq_ > 0 ? norm_sq / last_norm_sq_ : 1;
+  last_norm_sq_ = norm_sq;
+  return std::clamp(0.9 * ratio_sq, kTightest, kLoosest);
+}
+
+int InexactNewton::solve(const Positions& g, Metric& metric, Positions& d) {
   d.setZero(g.rows(), 3);
   residual_ = -g;
   metric.apply(residual_, preconditioned_);
   direction_ = preconditioned_;
   double norm_sq = dot(residual_, preconditioned_);
-  const double enough = forcing * forcing * norm_sq;
+  const double eta = forcing(norm_sq);
+  const double enough = eta * eta * norm_sq;
   int iterations = 0;
   while (iterations < kMaxIterations && norm_sq > enough) {
     multiply(direction_, product_);

@@ -25,17 +25,21 @@ class InexactNewton {
   /// Forgets the pattern: other vertices are held.
   void reset() { reduction_ = nullptr; }
 
+  /// A new step.
+  void begin() { last_norm_sq_ = 0; }
+
   /// H at x (|V| x 3, m). \param contact  as evaluated there, or null
   void assemble(const Positions& x, const model::StepProblem& problem, const Metric& metric,
                 const model::ContactTerms* contact);
 
-  /// d = -H^-1 g until the residual's norm in the metric has fallen by `forcing`, or after
-  /// kMaxIterations; n_f x 3. Returns the iterations. d leads down whatever they are, above 0.
-  int solve(const Positions& g, double forcing, Metric& metric, Positions& d);
+  /// d = -H^-1 g, as exactly as the progress since the last call deserves; n_f x 3. Returns the
+  /// iterations, kMaxIterations at most. d leads down whatever they are, above 0.
+  int solve(const Positions& g, Metric& metric, Positions& d);
 
  private:
   static constexpr int kMaxIterations = 200;
 
+  double forcing(double norm_sq);
   void multiply(const Positions& d, Positions& product);
   void add_contact(const Positions& d, Positions& product);
 
@@ -43,6 +47,7 @@ class InexactNewton {
   const model::ClothModel& model_;
   const model::Reduction* reduction_ = nullptr;  ///< the one that hessian_ has its pattern from
   std::vector<model::ContactBlock> blocks_;
+  double last_norm_sq_ = 0;  ///< of the gradient in the metric, at the last solve(); 0: none
   Positions residual_, preconditioned_, direction_, product_;
   Positions moved_, force_, folded_;  ///< |V| x 3, |V| x 3, n_f x 3: products with contact
 };
