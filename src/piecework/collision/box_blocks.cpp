@@ -8,7 +8,7 @@
 namespace piecework::collision {
 namespace {
 
-constexpr std::size_t kBlocksPerTask = 16;
+constexpr std::size_t kBlocksPerTask = 4;
 
 BoxRow row_of(const Element& element, std::span<const BoxRow> rows) {
   BoxRow row = rows[static_cast<std::size_t>(element.vertices[0])];

@@ -8,33 +8,47 @@ namespace piecework::collision {
 namespace {
 
 struct Avx2Lanes {
-  static unsigned bits(__m256 mask) { return static_cast<unsigned>(_mm256_movemask_ps(mask)); }
-  static __m256i integers(const int* lanes) {
-    return _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes));
-  }
   static __m256 at_most(__m256 a, __m256 b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
+  static unsigned bits(__m256 first, __m256 second) {
+    return static_cast<unsigned>(_mm256_movemask_ps(first) | _mm256_movemask_ps(second) << 8);
+  }
 
   static unsigned below(const BoxLanes& boxes, const float* bound, int stride) {
-    __m256 in = at_most(_mm256_load_ps(boxes.number[0]), _mm256_broadcast_ss(bound));
-    for (int k = 1; k < kNumbers; ++k)
-      in = _mm256_and_ps(
-          in, at_most(_mm256_load_ps(boxes.number[k]), _mm256_broadcast_ss(bound + k * stride)));
-    return bits(in);
+    const __m256 b0 = _mm256_broadcast_ss(bound);
+    __m256 in0 = at_most(_mm256_load_ps(boxes.number[0]), b0);
+    __m256 in1 = at_most(_mm256_load_ps(boxes.number[0] + 8), b0);
+    for (int k = 1; k < kNumbers; ++k) {
+      const __m256 b = _mm256_broadcast_ss(bound + k * stride);
+      in0 = _mm256_and_ps(in0, at_most(_mm256_load_ps(boxes.number[k]), b));
+      in1 = _mm256_and_ps(in1, at_most(_mm256_load_ps(boxes.number[k] + 8), b));
+    }
+    return bits(in0, in1);
   }
   static unsigned above(const float* box, const BoxLanes& bounds) {
-    __m256 in = at_most(_mm256_broadcast_ss(box), _mm256_load_ps(bounds.number[0]));
-    for (int k = 1; k < kNumbers; ++k)
-      in = _mm256_and_ps(
-          in, at_most(_mm256_broadcast_ss(box + k * kLanes), _mm256_load_ps(bounds.number[k])));
-    return bits(in);
+    const __m256 n0 = _mm256_broadcast_ss(box);
+    __m256 in0 = at_most(n0, _mm256_load_ps(bounds.number[0]));
+    __m256 in1 = at_most(n0, _mm256_load_ps(bounds.number[0] + 8));
+    for (int k = 1; k < kNumbers; ++k) {
+      const __m256 n = _mm256_broadcast_ss(box + k * kLanes);
+      in0 = _mm256_and_ps(in0, at_most(n, _mm256_load_ps(bounds.number[k])));
+      in1 = _mm256_and_ps(in1, at_most(n, _mm256_load_ps(bounds.number[k] + 8)));
+    }
+    return bits(in0, in1);
+  }
+
+  static __m256i integers(const int* lanes) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(lanes));
+  }
+  static unsigned bits(__m256i first, __m256i second) {
+    return bits(_mm256_castsi256_ps(first), _mm256_castsi256_ps(second));
   }
   static unsigned equal(const int* lanes, int number) {
-    return bits(
-        _mm256_castsi256_ps(_mm256_cmpeq_epi32(integers(lanes), _mm256_set1_epi32(number))));
+    const __m256i n = _mm256_set1_epi32(number);
+    return bits(_mm256_cmpeq_epi32(integers(lanes), n), _mm256_cmpeq_epi32(integers(lanes + 8), n));
   }
   static unsigned greater(const int* lanes, int number) {
-    return bits(
-        _mm256_castsi256_ps(_mm256_cmpgt_epi32(integers(lanes), _mm256_set1_epi32(number))));
+    const __m256i n = _mm256_set1_epi32(number);
+    return bits(_mm256_cmpgt_epi32(integers(lanes), n), _mm256_cmpgt_epi32(integers(lanes + 8), n));
   }
   static int append(int* end, const int* lanes, unsigned mask) {
     int count = 0;

@@ -1,7 +1,7 @@
 #pragma once
 
 // Boxes as the broad phase compares them: in single precision, in a frame of the cloth's size, and
-// eight at once. Private to `collision`.
+// sixteen at once. Private to `collision`.
 //
 // A box is seven numbers: low x, y, z, -high x, y, z and -last, where `last` is the largest id of
 // an element in it. A box n is within reach of another one exactly if n[k] <= q[k] for all k, where
@@ -13,7 +13,8 @@
 
 namespace piecework::collision {
 
-inline constexpr int kLanes = 8;  ///< boxes compared at once: elements of a leaf, leaves of a block
+inline constexpr int kLanes =
+    16;  ///< boxes compared at once: elements of a leaf, leaves of a block
 inline constexpr int kNumbers = 7;  ///< of a box
 inline constexpr int kBlockSize = kLanes * kLanes;
 inline constexpr int kMaxVertices = 3;  ///< of an element
@@ -23,23 +24,23 @@ struct alignas(32) BoxRow {
   float number[8];
 };
 
-/// Eight boxes, number by number.
-struct alignas(32) BoxLanes {
+/// Sixteen boxes, number by number.
+struct alignas(64) BoxLanes {
   float number[kNumbers][kLanes];
 };
 
-/// What eight elements are. Lanes without one have an empty box and kNoElement.
-struct alignas(32) LeafItems {
+/// What sixteen elements are. Lanes without one have an empty box and kNoElement.
+struct alignas(64) LeafItems {
   static constexpr int kNoElement = __INT_MAX__;
 
   int id[kLanes];
   int vertex[kMaxVertices][kLanes];  ///< the last one repeated if there are fewer
 };
 
-/// 64 elements that are neighbours in space.
+/// 256 elements that are neighbours in space.
 struct Block {
   BoxRow box;
-  BoxLanes leaves;            ///< the boxes of the eight leaves
+  BoxLanes leaves;            ///< the boxes of the sixteen leaves
   BoxLanes elements[kLanes];  ///< of each leaf
   LeafItems items[kLanes];
 };

@@ -7,7 +7,7 @@
 namespace piecework::collision {
 namespace {
 
-constexpr std::size_t kMostStripes = 256;  // enough for balance, few enough for their buffers
+constexpr std::size_t kMostStripes = 128;  // enough for balance, few enough for their buffers
 constexpr int kShortList = 64;             // longer ones are not sorted by counting
 
 /// Bounds of a block, to be compared with the numbers of a node.

@@ -17,11 +17,10 @@ inline BoxRow united(const BoxRow& a, const BoxRow& b) {
 
 /// The coordinates of single precision: (x - origin) * scale, clamped to +-kClamp.
 ///
-/// The cloth lies in [0, 2]^3. Obstacles may lie anywhere, but only what comes within `gap` of the
-/// cloth matters; gaps are cut to kMaxGap, beyond which everything clamped is within reach anyway
-/// or never. So the rounding of coordinates is a fixed fraction of the cloth's size.
+/// The cloth lies in [0, 2]^3. Obstacles may lie anywhere, but only what comes within the gap of
+/// the cloth matters, so that the rounding of coordinates is a fixed fraction of the cloth's size.
 struct UnitFrame {
-  static constexpr double kClamp = 16, kMaxGap = 8;
+  static constexpr double kClamp = 16;
 
   Vec3 origin = Vec3::Zero();  ///< m
   double scale = 1;            ///< 1/m, a power of two
@@ -35,10 +34,6 @@ struct UnitFrame {
     return r;
   }
 
-  bool operator==(const UnitFrame& other) const {
-    return origin == other.origin && scale == other.scale;
-  }
-
  private:
   [[nodiscard]] float coordinate(double x, int axis) const {
     const double unit = (x - origin[axis]) * scale;
@@ -46,9 +41,10 @@ struct UnitFrame {
   }
 };
 
-/// \param gap  m
+/// \param gap  m; where it exceeds what clamping leaves, all pairs are in doubt
 inline Reach reach_of(double gap, const UnitFrame& frame) {
-  const double g = gap * frame.scale < UnitFrame::kMaxGap ? gap * frame.scale : UnitFrame::kMaxGap;
+  const double g = gap * frame.scale;
+  if (g > UnitFrame::kClamp / 2) return {1e30F, -1e30F};
   const double doubt = 0x1.0p-21 * (2 + 2 * g);
   return {static_cast<float>(g + doubt), static_cast<float>(g - doubt)};
 }

@@ -1,0 +1,176 @@
+// The parts of the broad phase on their own.
+
+#include <algorithm>
+#include <bit>
+
+#include <gtest/gtest.h>
+
+#include <piecework/core/isa.hpp>
+#include <piecework/core/random.hpp>
+
+#include "morton.hpp"
+#include "pair_search.hpp"
+#include "radix_tree.hpp"
+#include "unit_frame.hpp"
+
+namespace piecework::collision {
+namespace {
+
+using Codes = std::vector<std::uint32_t>;
+
+/// Bits of the numbers one by one.
+std::uint32_t interleaved(const std::array<std::uint32_t, 3>& numbers) {
+  std::uint32_t code = 0;
+  for (int bit = 9; bit >= 0; --bit)
+    for (const std::uint32_t number : numbers) code = 2 * code + (number >> bit & 1);
+  return code;
+}
+
+TEST(Morton, InterleavesTheBitsOfTheCell) {
+  Random random(1);
+  for (int i = 0; i < 1000; ++i) {
+    std::array<std::uint32_t, 3> cell{};
+    for (auto& number : cell) number = static_cast<std::uint32_t>(random.uniform(0, 1024));
+    const auto middle = [&](std::size_t k) {
+      return (static_cast<float>(cell[k]) + 0.5F) / 1024.0F;
+    };
+    EXPECT_EQ(morton_code(middle(0), middle(1), middle(2)), interleaved(cell));
+  }
+  EXPECT_EQ(morton_code(-1, 0, 0), 0U);
+  EXPECT_EQ(morton_code(1, 2, 1e30F), (1U << 30) - 1);
+}
+
+TEST(Morton, SortsByCodeAndKeepsTheOrderOfEqualOnes) {
+  Random random(2);
+  for (const std::size_t count : {0U, 1U, 2U, 1000U, 16384U, 50000U})
+    for (const double values : {3.0, 1e9}) {
+      std::vector<std::uint64_t> keys, spare;
+      for (std::size_t i = 0; i < count; ++i)
+        keys.push_back(static_cast<std::uint64_t>(random.uniform(0, values)) << 32 | i);
+      std::vector<std::uint64_t> expected = keys;
+      std::sort(expected.begin(), expected.end());
+      sort_by_code(keys, spare);
+      EXPECT_TRUE(keys == expected) << count;
+    }
+}
+
+/// The radix tree by its definition: halves where the highest bit changes in which the codes of a
+/// range differ, equal codes where the highest bit of their places does.
+void expect_subtree(const Codes& codes, const std::vector<TreeNode>& nodes, std::size_t& k,
+                    std::size_t first, std::size_t last) {
+  const TreeNode& node = nodes[k];
+  EXPECT_EQ(node.skip, static_cast<int>(k + 2 * (last - first) + 1));
+  ++k;
+  if (first == last) {
+    EXPECT_EQ(node.block, static_cast<int>(first));
+    return;
+  }
+  EXPECT_EQ(node.block, -1);
+  const bool equal = codes[first] == codes[last];
+  const auto key = [&](std::size_t i) { return equal ? i : std::size_t{codes[i]}; };
+  const std::size_t bit = std::bit_floor(key(first) ^ key(last));
+  std::size_t split = first;
+  while ((key(split + 1) & bit) == 0) ++split;
+  expect_subtree(codes, nodes, k, first, split);
+  expect_subtree(codes, nodes, k, split + 1, last);
+}
+
+TEST(RadixTree, IsThatOfItsDefinition) {
+  Random random(3);
+  std::vector<TreeNode> nodes;
+  build_radix_tree({}, nodes);
+  EXPECT_TRUE(nodes.empty());
+  for (int scene = 0; scene < 200; ++scene) {
+    SCOPED_TRACE(scene);
+    Codes codes(1 + static_cast<std::size_t>(random.uniform(0, 300)));
+    const double values = scene % 4 == 0 ? 1 : scene % 4 == 1 ? 7 : 1e9;
+    for (auto& code : codes) code = static_cast<std::uint32_t>(random.uniform(0, values));
+    std::sort(codes.begin(), codes.end());
+    build_radix_tree(codes, nodes);
+    ASSERT_EQ(nodes.size(), 2 * codes.size() - 1);
+    std::size_t k = 0;
+    expect_subtree(codes, nodes, k, 0, codes.size() - 1);
+    EXPECT_EQ(k, nodes.size());
+  }
+}
+
+TEST(RadixTree, InnerBoxesHoldTheirLeaves) {
+  Random random(4);
+  std::vector<TreeNode> nodes;
+  build_radix_tree(Codes(100, 5), nodes);
+  for (TreeNode& node : nodes)
+    if (node.block >= 0)
+      for (float& number : node.box.number) number = static_cast<float>(random.uniform(-1, 1));
+  refit_inner_nodes(nodes);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    BoxRow least = kEmptyRow;
+    for (std::size_t i = k; i < static_cast<std::size_t>(nodes[k].skip); ++i)
+      if (nodes[i].block >= 0) least = united(least, nodes[i].box);
+    EXPECT_TRUE(std::equal(least.number, least.number + 8, nodes[k].box.number));
+  }
+}
+
+/// Random edges and triangles, searched with the kernels of one instruction set.
+std::vector<PairIndex> found_by(Isa isa, bool edges, std::size_t& compared) {
+  Random random(5);
+  constexpr int vertices = 900;
+  std::vector<BoxRow> rows;
+  BoxRow bounds = kEmptyRow;
+  for (int v = 0; v < vertices; ++v) {
+    const Vec3 x(random.uniform(), random.uniform(), random.uniform());
+    rows.push_back(UnitFrame().row({x, x + Vec3::Constant(0.02)}));
+    bounds = united(bounds, rows.back());
+  }
+  const auto near_vertex = [&](int v) { return std::min(v + 1, vertices - 1); };
+  std::vector<Element> own, others;
+  for (int v = 0; v < vertices; ++v) {
+    const int w = near_vertex(v), u = near_vertex(w);
+    own.push_back({v, edges ? std::array{v, w, w} : std::array{v, v, v}});
+    others.push_back({v, {v, w, u}});
+  }
+  BoxBlocks a(own, edges), b(others, edges);
+  for (BoxBlocks* blocks : {&a, &b}) {
+    blocks->build(rows, bounds);
+    blocks->refit(rows);
+  }
+  PairSearch search({{&a, {edges ? &a : &b}}}, vertices);
+  const BoxKernels& kernels = box_kernels(isa);
+  // Every second of the doubtful pairs: what the kernels make of the answer shows.
+  const Retest retest{nullptr, [](const void*, int p, int q) { return (p + q) % 2 == 0; }};
+  std::vector<PairIndex> pairs;
+  compared = search.run(edges ? kernels.edges_with_edges : kernels.vertices_with_triangles, kernels,
+                        {0.05F, 0.0F}, retest, pairs);
+  return pairs;
+}
+
+TEST(BoxKernels, AllInstructionSetsFindTheSame) {
+  for (const bool edges : {false, true}) {
+    std::size_t expected_tests = 0;
+    const std::vector<PairIndex> expected = found_by(Isa::Portable, edges, expected_tests);
+    EXPECT_GT(expected.size(), 1000U);
+    for (const Isa isa : available_isas()) {
+      SCOPED_TRACE(to_string(isa));
+      std::size_t tests = 0;
+      EXPECT_TRUE(found_by(isa, edges, tests) == expected);
+      EXPECT_EQ(tests, expected_tests);
+    }
+  }
+}
+
+TEST(BoxKernels, SortShortLists) {
+  Random random(6);
+  for (const Isa isa : available_isas())
+    for (int count = 0; count <= 64; ++count) {
+      std::vector<int> list;
+      for (int i = 0; i < count; ++i) list.push_back(1000 * i + static_cast<int>(random.uniform(0, 999)));
+      std::vector<int> expected = list, sorted(list.size());
+      for (std::size_t i = list.size(); i > 1; --i)
+        std::swap(list[i - 1], list[static_cast<std::size_t>(random.uniform(0, static_cast<double>(i)))]);
+      list.resize(list.size() + kLanes);
+      box_kernels(isa).sort(list.data(), count, sorted.data());
+      EXPECT_TRUE(sorted == expected) << to_string(isa) << " " << count;
+    }
+}
+
+}  // namespace
+}  // namespace piecework::collision
