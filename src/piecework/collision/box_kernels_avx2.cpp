@@ -8,39 +8,37 @@ namespace piecework::collision {
 namespace {
 
 struct Avx2Lanes {
-  static __m256 at_most(__m256 a, __m256 b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
-  static unsigned bits(__m256 first, __m256 second) {
-    return static_cast<unsigned>(_mm256_movemask_ps(first) | _mm256_movemask_ps(second) << 8);
+  static __m256i numbers(const short* lanes) {
+    return _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes));
+  }
+  /// Bits of the lanes that are zero; the others have all bits set.
+  static unsigned bits_of_zeros(__m256i lanes) {
+    const __m128i bytes =
+        _mm_packs_epi16(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256(lanes, 1));
+    return static_cast<unsigned>(_mm_movemask_epi8(bytes)) ^ 0xffffU;
   }
 
-  static unsigned below(const BoxLanes& boxes, const float* bound, int stride) {
-    const __m256 b0 = _mm256_broadcast_ss(bound);
-    __m256 in0 = at_most(_mm256_load_ps(boxes.number[0]), b0);
-    __m256 in1 = at_most(_mm256_load_ps(boxes.number[0] + 8), b0);
-    for (int k = 1; k < kNumbers; ++k) {
-      const __m256 b = _mm256_broadcast_ss(bound + k * stride);
-      in0 = _mm256_and_ps(in0, at_most(_mm256_load_ps(boxes.number[k]), b));
-      in1 = _mm256_and_ps(in1, at_most(_mm256_load_ps(boxes.number[k] + 8), b));
-    }
-    return bits(in0, in1);
+  static unsigned below(const BoxLanes& boxes, const short* bound, int stride) {
+    __m256i out = _mm256_setzero_si256();
+    for (int k = 0; k < kNumbers; ++k)
+      out = _mm256_or_si256(
+          out, _mm256_cmpgt_epi16(numbers(boxes.number[k]), _mm256_set1_epi16(bound[k * stride])));
+    return bits_of_zeros(out);
   }
-  static unsigned above(const float* box, const BoxLanes& bounds) {
-    const __m256 n0 = _mm256_broadcast_ss(box);
-    __m256 in0 = at_most(n0, _mm256_load_ps(bounds.number[0]));
-    __m256 in1 = at_most(n0, _mm256_load_ps(bounds.number[0] + 8));
-    for (int k = 1; k < kNumbers; ++k) {
-      const __m256 n = _mm256_broadcast_ss(box + k * kLanes);
-      in0 = _mm256_and_ps(in0, at_most(n, _mm256_load_ps(bounds.number[k])));
-      in1 = _mm256_and_ps(in1, at_most(n, _mm256_load_ps(bounds.number[k] + 8)));
-    }
-    return bits(in0, in1);
+  static unsigned above(const short* box, const BoxLanes& bounds) {
+    __m256i out = _mm256_setzero_si256();
+    for (int k = 0; k < kNumbers; ++k)
+      out = _mm256_or_si256(
+          out, _mm256_cmpgt_epi16(_mm256_set1_epi16(box[k * kLanes]), numbers(bounds.number[k])));
+    return bits_of_zeros(out);
   }
 
   static __m256i integers(const int* lanes) {
     return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(lanes));
   }
   static unsigned bits(__m256i first, __m256i second) {
-    return bits(_mm256_castsi256_ps(first), _mm256_castsi256_ps(second));
+    return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(first)) |
+                                 _mm256_movemask_ps(_mm256_castsi256_ps(second)) << 8);
   }
   static unsigned equal(const int* lanes, int number) {
     const __m256i n = _mm256_set1_epi32(number);

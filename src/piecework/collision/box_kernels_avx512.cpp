@@ -9,19 +9,20 @@ namespace {
 
 struct Avx512Lanes {
   static __m512i integers(const int* lanes) { return _mm512_loadu_si512(lanes); }
-  static unsigned at_most(__m512 a, __m512 b) { return _mm512_cmp_ps_mask(a, b, _CMP_LE_OQ); }
+  static __m256i numbers(const short* lanes) {
+    return _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes));
+  }
 
-  /// Comparisons first, masks later: chained by masks they would wait for each other.
-  static unsigned below(const BoxLanes& boxes, const float* bound, int stride) {
-    unsigned in = at_most(_mm512_load_ps(boxes.number[0]), _mm512_set1_ps(bound[0]));
-    for (int k = 1; k < kNumbers; ++k)
-      in &= at_most(_mm512_load_ps(boxes.number[k]), _mm512_set1_ps(bound[k * stride]));
+  static unsigned below(const BoxLanes& boxes, const short* bound, int stride) {
+    unsigned in = 0xffff;
+    for (int k = 0; k < kNumbers; ++k)
+      in &= _mm256_cmple_epi16_mask(numbers(boxes.number[k]), _mm256_set1_epi16(bound[k * stride]));
     return in;
   }
-  static unsigned above(const float* box, const BoxLanes& bounds) {
-    unsigned in = at_most(_mm512_set1_ps(box[0]), _mm512_load_ps(bounds.number[0]));
-    for (int k = 1; k < kNumbers; ++k)
-      in &= at_most(_mm512_set1_ps(box[k * kLanes]), _mm512_load_ps(bounds.number[k]));
+  static unsigned above(const short* box, const BoxLanes& bounds) {
+    unsigned in = 0xffff;
+    for (int k = 0; k < kNumbers; ++k)
+      in &= _mm256_cmple_epi16_mask(_mm256_set1_epi16(box[k * kLanes]), numbers(bounds.number[k]));
     return in;
   }
   static unsigned equal(const int* lanes, int number) {

@@ -9,28 +9,32 @@ struct BoxLoops {
   /// Bounds of the elements of a leaf, and of the leaf itself.
   struct Bounds {
     BoxLanes outer, inner;
-    float leaf[kNumbers];
+    short leaf[kNumbers];
   };
 
-  static Bounds bounds_of(const Block& own, int leaf, const Reach& reach, bool ordered) {
+  static short bound(int reach, short number) {
+    const int sum = reach - number;
+    if (number == kEmptyNumber || sum < kEmptyBound) return kEmptyBound;
+    return static_cast<short>(sum < kMostNumber ? sum : kMostNumber);
+  }
+
+  static Bounds bounds_of(const Block& own, int leaf, const Reach& reach) {
     Bounds b;
     const BoxLanes& boxes = own.elements[leaf];
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 6; ++k) {
+      const int opposite = (k + 3) % 6;
       for (int i = 0; i < kLanes; ++i) {
-        b.outer.number[k][i] = reach.outer - boxes.number[3 + k][i];
-        b.outer.number[3 + k][i] = reach.outer - boxes.number[k][i];
-        b.inner.number[k][i] = reach.inner - boxes.number[3 + k][i];
-        b.inner.number[3 + k][i] = reach.inner - boxes.number[k][i];
+        b.outer.number[k][i] = bound(reach.outer, boxes.number[opposite][i]);
+        b.inner.number[k][i] = bound(reach.inner, boxes.number[opposite][i]);
       }
-      b.leaf[k] = reach.outer - own.leaves.number[3 + k][leaf];
-      b.leaf[3 + k] = reach.outer - own.leaves.number[k][leaf];
+      b.leaf[k] = bound(reach.outer, own.leaves.number[opposite][leaf]);
     }
     constexpr int last = kNumbers - 1;
-    b.leaf[last] = -__builtin_inff();
+    b.leaf[last] = kEmptyBound;
     for (int i = 0; i < kLanes; ++i) {
-      const float bound = ordered ? -static_cast<float>(own.items[leaf].id[i]) : 0;
-      b.outer.number[last][i] = b.inner.number[last][i] = bound;
-      if (bound > b.leaf[last]) b.leaf[last] = bound;
+      const short rank = boxes.number[last][i];  // -last, and an element is its own last
+      b.outer.number[last][i] = b.inner.number[last][i] = rank;
+      if (rank != kEmptyNumber && rank > b.leaf[last]) b.leaf[last] = rank;
     }
     return b;
   }
@@ -106,7 +110,7 @@ struct BoxLoops {
   template <int kOwn, int kOther, bool kOrdered>
   static std::size_t meet(const LeafQuery& query, const Reach& reach, const Retest& retest,
                           Hits& hits) {
-    const Bounds bounds = bounds_of(*query.own, query.leaf, reach, kOrdered);
+    const Bounds bounds = bounds_of(*query.own, query.leaf, reach);
     Queue queue;
     std::size_t compared = 0;
     const auto work = [&] {

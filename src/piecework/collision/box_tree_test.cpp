@@ -100,7 +100,7 @@ TEST(RadixTree, InnerBoxesHoldTheirLeaves) {
   build_radix_tree(Codes(100, 5), nodes);
   for (TreeNode& node : nodes)
     if (node.block >= 0)
-      for (float& number : node.box.number) number = static_cast<float>(random.uniform(-1, 1));
+      for (short& number : node.box.number) number = static_cast<short>(random.uniform(-99, 99));
   refit_inner_nodes(nodes);
   for (std::size_t k = 0; k < nodes.size(); ++k) {
     BoxRow least = kEmptyRow;
@@ -116,9 +116,10 @@ std::vector<PairIndex> found_by(Isa isa, bool edges, std::size_t& compared) {
   constexpr int vertices = 900;
   std::vector<BoxRow> rows;
   BoxRow bounds = kEmptyRow;
+  const UnitFrame frame({Vec3::Zero(), Vec3::Ones()}, 0.05);
   for (int v = 0; v < vertices; ++v) {
     const Vec3 x(random.uniform(), random.uniform(), random.uniform());
-    rows.push_back(UnitFrame().row({x, x + Vec3::Constant(0.02)}));
+    rows.push_back(frame.row({x, x + Vec3::Constant(0.02)}));
     bounds = united(bounds, rows.back());
   }
   const auto near_vertex = [&](int v) { return std::min(v + 1, vertices - 1); };
@@ -128,7 +129,8 @@ std::vector<PairIndex> found_by(Isa isa, bool edges, std::size_t& compared) {
     own.push_back({v, edges ? std::array{v, w, w} : std::array{v, v, v}});
     others.push_back({v, {v, w, u}});
   }
-  BoxBlocks a(own, edges), b(others, edges);
+  const std::size_t ranked = edges ? vertices : 0;
+  BoxBlocks a(own, ranked), b(others, ranked);
   for (BoxBlocks* blocks : {&a, &b}) {
     blocks->build(rows, bounds);
     blocks->refit(rows);
@@ -139,7 +141,7 @@ std::vector<PairIndex> found_by(Isa isa, bool edges, std::size_t& compared) {
   const Retest retest{nullptr, [](const void*, int p, int q) { return (p + q) % 2 == 0; }};
   std::vector<PairIndex> pairs;
   compared = search.run(edges ? kernels.edges_with_edges : kernels.vertices_with_triangles, kernels,
-                        {0.05F, 0.0F}, retest, pairs);
+                        {frame.reach().outer, frame.reach().inner - 500}, retest, pairs);
   return pairs;
 }
 
@@ -162,10 +164,12 @@ TEST(BoxKernels, SortShortLists) {
   for (const Isa isa : available_isas())
     for (int count = 0; count <= 64; ++count) {
       std::vector<int> list;
-      for (int i = 0; i < count; ++i) list.push_back(1000 * i + static_cast<int>(random.uniform(0, 999)));
+      for (int i = 0; i < count; ++i)
+        list.push_back(1000 * i + static_cast<int>(random.uniform(0, 999)));
       std::vector<int> expected = list, sorted(list.size());
       for (std::size_t i = list.size(); i > 1; --i)
-        std::swap(list[i - 1], list[static_cast<std::size_t>(random.uniform(0, static_cast<double>(i)))]);
+        std::swap(list[i - 1],
+                  list[static_cast<std::size_t>(random.uniform(0, static_cast<double>(i)))]);
       list.resize(list.size() + kLanes);
       box_kernels(isa).sort(list.data(), count, sorted.data());
       EXPECT_TRUE(sorted == expected) << to_string(isa) << " " << count;

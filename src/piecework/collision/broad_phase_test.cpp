@@ -297,6 +297,47 @@ TEST(BroadPhase, HandlesObstaclesOfAnySize) {
   }
 }
 
+// More elements than there are ranks: several ids share one. Cloth and obstacle must agree on them.
+TEST(BroadPhase, FindsPairsOfElementsWithLargeNumbers) {
+  const mesh::TriangleMesh large = sheet_of(200), small = sheet_of(12);
+  const Surface surface =
+      make_surface(large.triangles, large.num_vertices(), small.triangles, 144, true);
+  ASSERT_GT(surface.edges.size(), 100000U);
+  Boxes boxes;
+  for (Eigen::Index v = 0; v < large.positions.rows(); ++v) {
+    const Vec3 x = large.positions.row(v);
+    boxes.push_back({x, x + Vec3(0, 0.01, 0)});
+  }
+  for (Eigen::Index v = 0; v < small.positions.rows(); ++v) {
+    const Vec3 x = Vec3(0.7, 0.012, 0.6) + 0.1 * small.positions.row(v).transpose();
+    boxes.push_back({x, x});
+  }
+  // Brute force among what comes near the small one.
+  Surface part = surface;
+  part.triangles.clear();
+  part.edges.clear();
+  std::vector<int> number;
+  for (std::size_t e = 0; e < surface.edges.size(); ++e) {
+    const VertexBox& box = boxes[static_cast<std::size_t>(surface.edges[e][0])];
+    const bool near = box.low[0] > 0.65 && box.low[0] < 0.85 && box.low[2] > 0.55;
+    if (near) part.edges.push_back(surface.edges[e]), number.push_back(static_cast<int>(e));
+  }
+  const auto is_cross = [](const Surface& s, const PairIndex& pair) {
+    return s.is_cloth(s.edges[static_cast<std::size_t>(pair.a)][0]) !=
+           s.is_cloth(s.edges[static_cast<std::size_t>(pair.b)][0]);
+  };
+  std::vector<PairIndex> expected, found;
+  part.self = false;
+  for (const PairIndex& pair : BruteForce{part, boxes, 0.003}.find().edge_edge)
+    expected.push_back(
+        {number[static_cast<std::size_t>(pair.a)], number[static_cast<std::size_t>(pair.b)]});
+  BroadPhase broad(surface);
+  for (const PairIndex& pair : broad.find(boxes, 0.003).edge_edge)
+    if (is_cross(surface, pair)) found.push_back(pair);
+  EXPECT_GT(expected.size(), 1000U);
+  EXPECT_TRUE(found == expected) << found.size() << " pairs, " << expected.size();
+}
+
 std::string error_of(const Boxes& boxes, double gap) {
   BroadPhase broad(make_surface({{0, 1, 2}}, 3, {}, 0, true));
   try {
