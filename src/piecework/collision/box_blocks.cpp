@@ -5,7 +5,7 @@
 
 #include <piecework/core/parallel.hpp>
 
-#include "morton.hpp"
+#include "space_curve.hpp"
 #include "unit_frame.hpp"
 
 namespace piecework::collision {
@@ -36,7 +36,7 @@ std::uint32_t code_of(const BoxRow& box, const BoxRow& bounds) {
     const int offset = twice(box) - 2 * bounds.number[k];
     unit[k] = size > 0 ? static_cast<float>(offset) / static_cast<float>(2 * size) : 0;
   }
-  return morton_code(unit[0], unit[1], unit[2]);
+  return hilbert_code(unit[0], unit[1], unit[2]);
 }
 
 void store(const BoxRow& row, BoxLanes& lanes, int lane) {

@@ -41,7 +41,7 @@ struct BoxLoops {
 
   /// Of the lanes in `hits`, those that belong into the result for element `lane` of `own`.
   template <int kOwn, int kOther>
-  static unsigned without_neighbours(unsigned hits, const LeafItems& own, int lane,
+  static unsigned without_neighbours(unsigned hits, const LeafItems& own, unsigned lane,
                                      const LeafItems& others) {
     for (int i = 0; i < kOwn; ++i)
       for (int j = 0; j < kOther; ++j) hits &= ~Lanes::equal(others.vertex[j], own.vertex[i][lane]);
@@ -68,6 +68,14 @@ struct BoxLoops {
     [[nodiscard]] bool has_room_for_block() const { return size <= kFull - kBlockSize; }
   };
 
+  struct Place {
+    unsigned n, leaf, lane;
+  };
+  static Place place_of(int entry) {
+    const auto e = static_cast<unsigned>(entry);
+    return {e / kBlockSize, e / kLanes % kLanes, e % kLanes};
+  }
+
   /// Queues the lanes of the leaf that reach leaf `other` of a block, the n-th in `near`.
   static void queue_lanes(const Bounds& bounds, const Block& block, int n, int other,
                           Queue& queue) {
@@ -83,26 +91,25 @@ struct BoxLoops {
     unsigned found[Queue::kFull];
     int left = 0;
     for (int i = 0; i < queue.size; ++i) {
-      const int entry = queue.entry[i];
-      const int lane = entry % kLanes, leaf = entry / kLanes % kLanes, n = entry / kBlockSize;
-      found[left] = Lanes::below(query.blocks[query.near[n]].elements[leaf],
-                                 &bounds.outer.number[0][lane], kLanes);
-      queue.entry[left] = entry;
+      const Place p = place_of(queue.entry[i]);
+      found[left] = Lanes::below(query.blocks[query.near[p.n]].elements[p.leaf],
+                                 &bounds.outer.number[0][p.lane], kLanes);
+      queue.entry[left] = queue.entry[i];
       left += found[left] != 0 ? 1 : 0;
     }
     const LeafItems& own = query.own->items[query.leaf];
     for (int i = 0; i < left; ++i) {
-      const int entry = queue.entry[i];
-      const int lane = entry % kLanes, leaf = entry / kLanes % kLanes, n = entry / kBlockSize;
-      const Block& block = query.blocks[query.near[n]];
-      const LeafItems& others = block.items[leaf];
+      const Place p = place_of(queue.entry[i]);
+      const Block& block = query.blocks[query.near[p.n]];
+      const LeafItems& others = block.items[p.leaf];
       unsigned partners = found[i];
-      if (kOrdered) partners &= Lanes::greater(others.id, own.id[lane]);
-      partners = without_neighbours<kOwn, kOther>(partners, own, lane, others);
+      if (kOrdered) partners &= Lanes::greater(others.id, own.id[p.lane]);
+      partners = without_neighbours<kOwn, kOther>(partners, own, p.lane, others);
       const unsigned doubtful =
-          partners & ~Lanes::below(block.elements[leaf], &bounds.inner.number[0][lane], kLanes);
-      if (doubtful != 0) partners = decided(doubtful, partners, retest, own.id[lane], others);
-      hits.count[lane] += Lanes::append(hits.list[lane] + hits.count[lane], others.id, partners);
+          partners & ~Lanes::below(block.elements[p.leaf], &bounds.inner.number[0][p.lane], kLanes);
+      if (doubtful != 0) partners = decided(doubtful, partners, retest, own.id[p.lane], others);
+      hits.count[p.lane] +=
+          Lanes::append(hits.list[p.lane] + hits.count[p.lane], others.id, partners);
     }
     queue.size = 0;
   }

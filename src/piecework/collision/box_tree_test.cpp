@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdlib>
 
 #include <gtest/gtest.h>
 
 #include <piecework/core/isa.hpp>
 #include <piecework/core/random.hpp>
 
-#include "morton.hpp"
 #include "pair_search.hpp"
 #include "radix_tree.hpp"
+#include "space_curve.hpp"
 #include "unit_frame.hpp"
 
 namespace piecework::collision {
@@ -18,29 +19,37 @@ namespace {
 
 using Codes = std::vector<std::uint32_t>;
 
-/// Bits of the numbers one by one.
-std::uint32_t interleaved(const std::array<std::uint32_t, 3>& numbers) {
-  std::uint32_t code = 0;
-  for (int bit = 9; bit >= 0; --bit)
-    for (const std::uint32_t number : numbers) code = 2 * code + (number >> bit & 1);
-  return code;
-}
-
-TEST(Morton, InterleavesTheBitsOfTheCell) {
-  Random random(1);
-  for (int i = 0; i < 1000; ++i) {
-    std::array<std::uint32_t, 3> cell{};
-    for (auto& number : cell) number = static_cast<std::uint32_t>(random.uniform(0, 1024));
-    const auto middle = [&](std::size_t k) {
-      return (static_cast<float>(cell[k]) + 0.5F) / 1024.0F;
+// At every level of the octree the curve passes through all cells, from each to one beside it.
+TEST(SpaceCurve, GoesFromCellToCell) {
+  for (const int level : {1, 2, 4, 5}) {
+    const int cells = 1 << level;
+    std::vector<std::array<int, 3>> visited(static_cast<std::size_t>(cells * cells * cells),
+                                            {-1, -1, -1});
+    const auto middle = [&](int i) {
+      return (static_cast<float>(i) + 0.5F) / static_cast<float>(cells);
     };
-    EXPECT_EQ(morton_code(middle(0), middle(1), middle(2)), interleaved(cell));
+    for (int i = 0; i < cells; ++i)
+      for (int j = 0; j < cells; ++j)
+        for (int k = 0; k < cells; ++k)
+          visited[hilbert_code(middle(i), middle(j), middle(k)) >> (30 - 3 * level)] = {i, j, k};
+    for (std::size_t n = 0; n < visited.size(); ++n) {
+      ASSERT_GE(visited[n][0], 0) << "no cell has place " << n;
+      if (n == 0) continue;
+      int steps = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        steps += std::abs(visited[n][axis] - visited[n - 1][axis]);
+      ASSERT_EQ(steps, 1) << n;
+    }
   }
-  EXPECT_EQ(morton_code(-1, 0, 0), 0U);
-  EXPECT_EQ(morton_code(1, 2, 1e30F), (1U << 30) - 1);
 }
 
-TEST(Morton, SortsByCodeAndKeepsTheOrderOfEqualOnes) {
+TEST(SpaceCurve, ClampsWhatIsOutside) {
+  EXPECT_EQ(hilbert_code(-1, -1e30F, 0), hilbert_code(0, 0, 0));
+  EXPECT_EQ(hilbert_code(1, 2, 1e30F), hilbert_code(0.9999F, 0.9999F, 0.9999F));
+  EXPECT_NE(hilbert_code(1, 1, 1), hilbert_code(0, 0, 0));
+}
+
+TEST(SpaceCurve, SortsByCodeAndKeepsTheOrderOfEqualOnes) {
   Random random(2);
   for (const std::size_t count : {0U, 1U, 2U, 1000U, 16384U, 50000U})
     for (const double values : {3.0, 1e9}) {
