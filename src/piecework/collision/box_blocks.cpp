@@ -28,13 +28,15 @@ double area(const BoxRow& box) {
   return side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
 }
 
+/// Place of the box's middle along the curve through a cube around `bounds`.
 std::uint32_t code_of(const BoxRow& box, const BoxRow& bounds) {
+  int size = 1;
+  for (std::size_t k = 0; k < 3; ++k)
+    size = std::max(size, -bounds.number[3 + k] - bounds.number[k]);
   std::array<float, 3> unit{};
   for (std::size_t k = 0; k < 3; ++k) {
-    const auto twice = [&](const BoxRow& b) { return b.number[k] - b.number[3 + k]; };
-    const int size = -bounds.number[3 + k] - bounds.number[k];
-    const int offset = twice(box) - 2 * bounds.number[k];
-    unit[k] = size > 0 ? static_cast<float>(offset) / static_cast<float>(2 * size) : 0;
+    const int twice = box.number[k] - box.number[3 + k] - 2 * bounds.number[k];
+    unit[k] = static_cast<float>(twice) / static_cast<float>(2 * size);
   }
   return hilbert_code(unit[0], unit[1], unit[2]);
 }
