@@ -1,14 +1,17 @@
 #include "box_blocks.hpp"
 
+#include <algorithm>
+#include <bit>
+
 #include <piecework/core/parallel.hpp>
 
-#include "morton.hpp"
+#include "space_curve.hpp"
 #include "unit_frame.hpp"
 
 namespace piecework::collision {
 namespace {
 
-constexpr std::size_t kBlocksPerTask = 16;
+constexpr std::size_t kBlocksPerTask = 4;
 
 BoxRow row_of(const Element& element, std::span<const BoxRow> rows) {
   BoxRow row = rows[static_cast<std::size_t>(element.vertices[0])];
@@ -20,18 +23,22 @@ BoxRow row_of(const Element& element, std::span<const BoxRow> rows) {
 /// Half the surface; of a box with something in it.
 double area(const BoxRow& box) {
   std::array<double, 3> side{};
-  for (std::size_t k = 0; k < 3; ++k) side[k] = -double{box.number[3 + k]} - double{box.number[k]};
+  for (std::size_t k = 0; k < 3; ++k)
+    side[k] = -static_cast<double>(box.number[3 + k]) - static_cast<double>(box.number[k]);
   return side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
 }
 
+/// Place of the box's middle along the curve through a cube around `bounds`.
 std::uint32_t code_of(const BoxRow& box, const BoxRow& bounds) {
+  int size = 1;
+  for (std::size_t k = 0; k < 3; ++k)
+    size = std::max(size, -bounds.number[3 + k] - bounds.number[k]);
   std::array<float, 3> unit{};
   for (std::size_t k = 0; k < 3; ++k) {
-    const float size = -bounds.number[3 + k] - bounds.number[k];
-    const float middle = (box.number[k] - box.number[3 + k]) / 2;
-    unit[k] = size > 0 ? (middle - bounds.number[k]) / size : 0;
+    const int twice = box.number[k] - box.number[3 + k] - 2 * bounds.number[k];
+    unit[k] = static_cast<float>(twice) / static_cast<float>(2 * size);
   }
-  return morton_code(unit[0], unit[1], unit[2]);
+  return hilbert_code(unit[0], unit[1], unit[2]);
 }
 
 void store(const BoxRow& row, BoxLanes& lanes, int lane) {
@@ -40,9 +47,10 @@ void store(const BoxRow& row, BoxLanes& lanes, int lane) {
 
 }  // namespace
 
-BoxBlocks::BoxBlocks(std::vector<Element> elements, bool ordered)
+BoxBlocks::BoxBlocks(std::vector<Element> elements, std::size_t num_ranked)
     : elements_(std::move(elements)),
-      ordered_(ordered),
+      rank_shift_(num_ranked > 0 ? std::max(0, static_cast<int>(std::bit_width(num_ranked)) - 15)
+                                 : 31),
       blocks_((elements_.size() + kBlockSize - 1) / kBlockSize),
       keys_(elements_.size()) {}
 
@@ -89,8 +97,8 @@ Areas BoxBlocks::refit_block(std::size_t b, std::span<const BoxRow> rows) {
       if (id != LeafItems::kNoElement) {
         row = row_of({id, {items.vertex[0][lane], items.vertex[1][lane], items.vertex[2][lane]}},
                      rows);
-        row.number[kNumbers - 1] = ordered_ ? -static_cast<float>(id) : 0;
-        row.number[kNumbers] = ordered_ ? static_cast<float>(id) : 0;
+        row.number[kNumbers] = static_cast<short>(id >> rank_shift_);
+        row.number[kNumbers - 1] = static_cast<short>(-row.number[kNumbers]);
         areas.elements += area(row);
       }
       store(row, block.elements[leaf], lane);

@@ -18,7 +18,7 @@ struct Element {
   std::array<int, kMaxVertices> vertices;  ///< the last one repeated if there are fewer
 };
 
-/// Surface areas in the unit frame: how loosely the tree fits around what it holds.
+/// Surface areas in steps: how loosely the tree fits around what it holds.
 struct Areas {
   double elements = 0;
   double tree = 0;  ///< of leaves, blocks and inner nodes
@@ -32,8 +32,9 @@ struct Areas {
 
 class BoxBlocks {
  public:
-  /// \param ordered  boxes know their ids, so that a search can leave out lower ones
-  BoxBlocks(std::vector<Element> elements, bool ordered);
+  /// \param num_ranked  ids are below, also those of blocks to be searched: boxes know their ranks,
+  ///                    so that a search can leave out lower ones; 0: all have the same rank
+  BoxBlocks(std::vector<Element> elements, std::size_t num_ranked);
 
   /// Sorts the elements by where they are now and builds the tree. refit() must follow.
   /// \param rows  boxes of all vertices
@@ -51,7 +52,7 @@ class BoxBlocks {
   Areas refit_block(std::size_t b, std::span<const BoxRow> rows);
 
   std::vector<Element> elements_;
-  bool ordered_;
+  int rank_shift_ = 0;  // ranks are ids without their last bits: 15 are left, or none
   std::vector<Block> blocks_;
   std::vector<TreeNode> nodes_;
   std::vector<int> node_of_block_;

@@ -8,33 +8,45 @@ namespace piecework::collision {
 namespace {
 
 struct Avx2Lanes {
-  static unsigned bits(__m256 mask) { return static_cast<unsigned>(_mm256_movemask_ps(mask)); }
-  static __m256i integers(const int* lanes) {
+  static __m256i numbers(const short* lanes) {
     return _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes));
   }
-  static __m256 at_most(__m256 a, __m256 b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
-
-  static unsigned below(const BoxLanes& boxes, const float* bound, int stride) {
-    __m256 in = at_most(_mm256_load_ps(boxes.number[0]), _mm256_broadcast_ss(bound));
-    for (int k = 1; k < kNumbers; ++k)
-      in = _mm256_and_ps(
-          in, at_most(_mm256_load_ps(boxes.number[k]), _mm256_broadcast_ss(bound + k * stride)));
-    return bits(in);
+  /// Bits of the lanes that are zero; the others have all bits set.
+  static unsigned bits_of_zeros(__m256i lanes) {
+    const __m128i bytes =
+        _mm_packs_epi16(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256(lanes, 1));
+    return static_cast<unsigned>(_mm_movemask_epi8(bytes)) ^ 0xffffU;
   }
-  static unsigned above(const float* box, const BoxLanes& bounds) {
-    __m256 in = at_most(_mm256_broadcast_ss(box), _mm256_load_ps(bounds.number[0]));
-    for (int k = 1; k < kNumbers; ++k)
-      in = _mm256_and_ps(
-          in, at_most(_mm256_broadcast_ss(box + k * kLanes), _mm256_load_ps(bounds.number[k])));
-    return bits(in);
+
+  static unsigned below(const BoxLanes& boxes, const short* bound, int stride) {
+    __m256i out = _mm256_setzero_si256();
+    for (int k = 0; k < kNumbers; ++k)
+      out = _mm256_or_si256(
+          out, _mm256_cmpgt_epi16(numbers(boxes.number[k]), _mm256_set1_epi16(bound[k * stride])));
+    return bits_of_zeros(out);
+  }
+  static unsigned above(const short* box, const BoxLanes& bounds) {
+    __m256i out = _mm256_setzero_si256();
+    for (int k = 0; k < kNumbers; ++k)
+      out = _mm256_or_si256(
+          out, _mm256_cmpgt_epi16(_mm256_set1_epi16(box[k * kLanes]), numbers(bounds.number[k])));
+    return bits_of_zeros(out);
+  }
+
+  static __m256i integers(const int* lanes) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(lanes));
+  }
+  static unsigned bits(__m256i first, __m256i second) {
+    return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(first)) |
+                                 _mm256_movemask_ps(_mm256_castsi256_ps(second)) << 8);
   }
   static unsigned equal(const int* lanes, int number) {
-    return bits(
-        _mm256_castsi256_ps(_mm256_cmpeq_epi32(integers(lanes), _mm256_set1_epi32(number))));
+    const __m256i n = _mm256_set1_epi32(number);
+    return bits(_mm256_cmpeq_epi32(integers(lanes), n), _mm256_cmpeq_epi32(integers(lanes + 8), n));
   }
   static unsigned greater(const int* lanes, int number) {
-    return bits(
-        _mm256_castsi256_ps(_mm256_cmpgt_epi32(integers(lanes), _mm256_set1_epi32(number))));
+    const __m256i n = _mm256_set1_epi32(number);
+    return bits(_mm256_cmpgt_epi32(integers(lanes), n), _mm256_cmpgt_epi32(integers(lanes + 8), n));
   }
   static int append(int* end, const int* lanes, unsigned mask) {
     int count = 0;

@@ -1,4 +1,4 @@
-// Kernels for AVX-512 with 256-bit vectors: masks, and lanes written by one instruction.
+// Kernels for AVX-512.
 
 #include <immintrin.h>
 
@@ -8,35 +8,33 @@ namespace piecework::collision {
 namespace {
 
 struct Avx512Lanes {
-  static __m256i integers(const int* lanes) {
+  static __m512i integers(const int* lanes) { return _mm512_loadu_si512(lanes); }
+  static __m256i numbers(const short* lanes) {
     return _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes));
   }
 
-  static unsigned below(const BoxLanes& boxes, const float* bound, int stride) {
-    __mmask8 in = 0xff;
+  static unsigned below(const BoxLanes& boxes, const short* bound, int stride) {
+    unsigned in = 0xffff;
     for (int k = 0; k < kNumbers; ++k)
-      in = _mm256_mask_cmp_ps_mask(in, _mm256_load_ps(boxes.number[k]),
-                                   _mm256_broadcast_ss(bound + k * stride), _CMP_LE_OQ);
+      in &= _mm256_cmple_epi16_mask(numbers(boxes.number[k]), _mm256_set1_epi16(bound[k * stride]));
     return in;
   }
-  static unsigned above(const float* box, const BoxLanes& bounds) {
-    __mmask8 in = 0xff;
+  static unsigned above(const short* box, const BoxLanes& bounds) {
+    unsigned in = 0xffff;
     for (int k = 0; k < kNumbers; ++k)
-      in = _mm256_mask_cmp_ps_mask(in, _mm256_broadcast_ss(box + k * kLanes),
-                                   _mm256_load_ps(bounds.number[k]), _CMP_LE_OQ);
+      in &= _mm256_cmple_epi16_mask(_mm256_set1_epi16(box[k * kLanes]), numbers(bounds.number[k]));
     return in;
   }
   static unsigned equal(const int* lanes, int number) {
-    return _mm256_cmpeq_epi32_mask(integers(lanes), _mm256_set1_epi32(number));
+    return _mm512_cmpeq_epi32_mask(integers(lanes), _mm512_set1_epi32(number));
   }
   static unsigned greater(const int* lanes, int number) {
-    return _mm256_cmpgt_epi32_mask(integers(lanes), _mm256_set1_epi32(number));
+    return _mm512_cmpgt_epi32_mask(integers(lanes), _mm512_set1_epi32(number));
   }
   /// Compressed in a register: straight to memory is slow on some processors.
   static int append(int* end, const int* lanes, unsigned mask) {
-    const __m256i packed =
-        _mm256_maskz_compress_epi32(static_cast<__mmask8>(mask), integers(lanes));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(end), packed);
+    _mm512_storeu_si512(end,
+                        _mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), integers(lanes)));
     return __builtin_popcount(mask);
   }
 };

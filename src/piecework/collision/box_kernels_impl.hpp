@@ -6,38 +6,42 @@ namespace {
 
 template <class Lanes>
 struct BoxLoops {
-  /// Bounds of the eight elements of a leaf, and of the leaf itself.
+  /// Bounds of the elements of a leaf, and of the leaf itself.
   struct Bounds {
     BoxLanes outer, inner;
-    float leaf[kNumbers];
+    short leaf[kNumbers];
   };
 
-  static Bounds bounds_of(const Block& own, int leaf, const Reach& reach, bool ordered) {
+  static short bound(int reach, short number) {
+    const int sum = reach - number;
+    if (number == kEmptyNumber || sum < kEmptyBound) return kEmptyBound;
+    return static_cast<short>(sum < kMostNumber ? sum : kMostNumber);
+  }
+
+  static Bounds bounds_of(const Block& own, int leaf, const Reach& reach) {
     Bounds b;
     const BoxLanes& boxes = own.elements[leaf];
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 6; ++k) {
+      const int opposite = (k + 3) % 6;
       for (int i = 0; i < kLanes; ++i) {
-        b.outer.number[k][i] = reach.outer - boxes.number[3 + k][i];
-        b.outer.number[3 + k][i] = reach.outer - boxes.number[k][i];
-        b.inner.number[k][i] = reach.inner - boxes.number[3 + k][i];
-        b.inner.number[3 + k][i] = reach.inner - boxes.number[k][i];
+        b.outer.number[k][i] = bound(reach.outer, boxes.number[opposite][i]);
+        b.inner.number[k][i] = bound(reach.inner, boxes.number[opposite][i]);
       }
-      b.leaf[k] = reach.outer - own.leaves.number[3 + k][leaf];
-      b.leaf[3 + k] = reach.outer - own.leaves.number[k][leaf];
+      b.leaf[k] = bound(reach.outer, own.leaves.number[opposite][leaf]);
     }
     constexpr int last = kNumbers - 1;
-    b.leaf[last] = -__builtin_inff();
+    b.leaf[last] = kEmptyBound;
     for (int i = 0; i < kLanes; ++i) {
-      const float bound = ordered ? -static_cast<float>(own.items[leaf].id[i]) : 0;
-      b.outer.number[last][i] = b.inner.number[last][i] = bound;
-      if (bound > b.leaf[last]) b.leaf[last] = bound;
+      const short rank = boxes.number[last][i];  // -last, and an element is its own last
+      b.outer.number[last][i] = b.inner.number[last][i] = rank;
+      if (rank != kEmptyNumber && rank > b.leaf[last]) b.leaf[last] = rank;
     }
     return b;
   }
 
   /// Of the lanes in `hits`, those that belong into the result for element `lane` of `own`.
   template <int kOwn, int kOther>
-  static unsigned without_neighbours(unsigned hits, const LeafItems& own, int lane,
+  static unsigned without_neighbours(unsigned hits, const LeafItems& own, unsigned lane,
                                      const LeafItems& others) {
     for (int i = 0; i < kOwn; ++i)
       for (int j = 0; j < kOther; ++j) hits &= ~Lanes::equal(others.vertex[j], own.vertex[i][lane]);
@@ -53,48 +57,94 @@ struct BoxLoops {
     return hits;
   }
 
+  /// Comparisons to be made: (block * kLanes + leaf) * kLanes + lane, block by its place in `near`.
+  /// They go through queues, stage by stage, so that no branch depends on what they give: such
+  /// branches cost more than the comparisons (measured: a third of the search).
+  struct Queue {
+    static constexpr int kFull = 1024;
+    int entry[kFull + kLanes];
+    int size = 0;
+
+    [[nodiscard]] bool has_room_for_block() const { return size <= kFull - kBlockSize; }
+  };
+
+  struct Place {
+    unsigned n, leaf, lane;
+  };
+  static Place place_of(int entry) {
+    const auto e = static_cast<unsigned>(entry);
+    return {e / kBlockSize, e / kLanes % kLanes, e % kLanes};
+  }
+
+  /// Queues the lanes of the leaf that reach leaf `other` of a block, the n-th in `near`.
+  static void queue_lanes(const Bounds& bounds, const Block& block, int n, int other,
+                          Queue& queue) {
+    const unsigned lanes = Lanes::above(&block.leaves.number[0][other], bounds.outer);
+    int entries[kLanes];
+    for (int i = 0; i < kLanes; ++i) entries[i] = (n * kLanes + other) * kLanes + i;
+    queue.size += Lanes::append(queue.entry + queue.size, entries, lanes);
+  }
+
+  template <int kOwn, int kOther, bool kOrdered>
+  static void work_off(const LeafQuery& query, const Bounds& bounds, const Retest& retest,
+                       Queue& queue, Hits& hits) {
+    unsigned found[Queue::kFull];
+    int left = 0;
+    for (int i = 0; i < queue.size; ++i) {
+      const Place p = place_of(queue.entry[i]);
+      found[left] = Lanes::below(query.blocks[query.near[p.n]].elements[p.leaf],
+                                 &bounds.outer.number[0][p.lane], kLanes);
+      queue.entry[left] = queue.entry[i];
+      left += found[left] != 0 ? 1 : 0;
+    }
+    const LeafItems& own = query.own->items[query.leaf];
+    for (int i = 0; i < left; ++i) {
+      const Place p = place_of(queue.entry[i]);
+      const Block& block = query.blocks[query.near[p.n]];
+      const LeafItems& others = block.items[p.leaf];
+      unsigned partners = found[i];
+      if (kOrdered) partners &= Lanes::greater(others.id, own.id[p.lane]);
+      partners = without_neighbours<kOwn, kOther>(partners, own, p.lane, others);
+      const unsigned doubtful =
+          partners & ~Lanes::below(block.elements[p.leaf], &bounds.inner.number[0][p.lane], kLanes);
+      if (doubtful != 0) partners = decided(doubtful, partners, retest, own.id[p.lane], others);
+      hits.count[p.lane] +=
+          Lanes::append(hits.list[p.lane] + hits.count[p.lane], others.id, partners);
+    }
+    queue.size = 0;
+  }
+
   template <int kOwn, int kOther, bool kOrdered>
   static std::size_t meet(const LeafQuery& query, const Reach& reach, const Retest& retest,
                           Hits& hits) {
-    const Bounds bounds = bounds_of(*query.own, query.leaf, reach, kOrdered);
-    const LeafItems& own = query.own->items[query.leaf];
+    const Bounds bounds = bounds_of(*query.own, query.leaf, reach);
+    Queue queue;
     std::size_t compared = 0;
+    const auto work = [&] {
+      compared += static_cast<std::size_t>(queue.size);
+      work_off<kOwn, kOther, kOrdered>(query, bounds, retest, queue, hits);
+    };
     for (int n = 0; n < query.count; ++n) {
       const Block& block = query.blocks[query.near[n]];
-      ++compared;
-      for (unsigned leaves = Lanes::below(block.leaves, bounds.leaf, 1); leaves != 0;
-           leaves &= leaves - 1) {
-        const int leaf = __builtin_ctz(leaves);
-        const BoxLanes& boxes = block.elements[leaf];
-        const LeafItems& others = block.items[leaf];
-        ++compared;
-        for (unsigned lanes = Lanes::above(&block.leaves.number[0][leaf], bounds.outer); lanes != 0;
-             lanes &= lanes - 1) {
-          const int lane = __builtin_ctz(lanes);
-          unsigned found = Lanes::below(boxes, &bounds.outer.number[0][lane], kLanes);
-          ++compared;
-          if (kOrdered) found &= Lanes::greater(others.id, own.id[lane]);
-          if (found == 0) continue;
-          found = without_neighbours<kOwn, kOther>(found, own, lane, others);
-          if (found == 0) continue;
-          const unsigned doubtful =
-              found & ~Lanes::below(boxes, &bounds.inner.number[0][lane], kLanes);
-          if (doubtful != 0) found = decided(doubtful, found, retest, own.id[lane], others);
-          hits.count[lane] += Lanes::append(hits.list[lane] + hits.count[lane], others.id, found);
-        }
-      }
+      if (!queue.has_room_for_block()) work();
+      const unsigned leaves = Lanes::below(block.leaves, bounds.leaf, 1);
+      compared += static_cast<std::size_t>(1 + __builtin_popcount(leaves));
+      for (unsigned rest = leaves; rest != 0; rest &= rest - 1)
+        queue_lanes(bounds, block, n, __builtin_ctz(rest), queue);
     }
+    work();
     return compared * kLanes;
   }
 
-  /// A number's place is how many are smaller.
+  /// A number's place is how many are not larger, itself left out.
   static void sort(int* list, int count, int* sorted) {
     for (int i = 0; i < kLanes; ++i) list[count + i] = LeafItems::kNoElement;
     const int padded = (count + kLanes - 1) / kLanes * kLanes;
     for (int i = 0; i < count; ++i) {
-      int place = 0;
-      for (int j = 0; j < padded; ++j) place += list[j] < list[i] ? 1 : 0;
-      sorted[place] = list[i];
+      int larger = 0;
+      for (int j = 0; j < padded; j += kLanes)
+        larger += __builtin_popcount(Lanes::greater(list + j, list[i]));
+      sorted[padded - 1 - larger] = list[i];
     }
   }
 

@@ -15,16 +15,16 @@ struct PlainLanes {
   }
 
   /// The boxes whose numbers are all below bound[k * stride].
-  static unsigned below(const BoxLanes& boxes, const float* bound, int stride) {
-    int in[kLanes];
+  static unsigned below(const BoxLanes& boxes, const short* bound, int stride) {
+    short in[kLanes];
     for (int i = 0; i < kLanes; ++i) in[i] = 1;
     for (int k = 0; k < kNumbers; ++k)
       for (int i = 0; i < kLanes; ++i) in[i] &= boxes.number[k][i] <= bound[k * stride] ? 1 : 0;
     return bits([&](int i) { return in[i] != 0; });
   }
   /// The bounds that are all above the box, whose numbers stand kLanes apart.
-  static unsigned above(const float* box, const BoxLanes& bounds) {
-    int in[kLanes];
+  static unsigned above(const short* box, const BoxLanes& bounds) {
+    short in[kLanes];
     for (int i = 0; i < kLanes; ++i) in[i] = 1;
     for (int k = 0; k < kNumbers; ++k)
       for (int i = 0; i < kLanes; ++i) in[i] &= box[k * kLanes] <= bounds.number[k][i] ? 1 : 0;

@@ -53,28 +53,14 @@ bool within_gap(const VertexBox& a, const VertexBox& b, double gap) {
   return (a.low - b.high).maxCoeff() <= gap && (b.low - a.high).maxCoeff() <= gap;
 }
 
-/// Around boxes of cloth. Its corner is one of a grid as wide as the cloth, so that the frame, and
-/// with it the rows of obstacles at rest, stay the same while little moves.
-UnitFrame frame_around(std::span<const VertexBox> boxes) {
-  const double inf = std::numeric_limits<double>::infinity();
-  const VertexBox nothing{Vec3::Constant(inf), Vec3::Constant(-inf)};
-  const VertexBox all = parallel_reduce_blocks(
-      boxes.size(), nothing,
+VertexBox united(std::span<const VertexBox> boxes) {
+  return parallel_reduce_blocks(
+      boxes.size(), boxes.front(),
       [&](std::size_t begin, std::size_t end, VertexBox sum) {
         for (std::size_t v = begin; v < end; ++v) sum = united(sum, boxes[v]);
         return sum;
       },
-      united, kParallelGrain);
-  int exponent = 0;
-  std::frexp((all.high - all.low).maxCoeff(), &exponent);
-  UnitFrame frame;
-  frame.scale = std::ldexp(1.0, -std::clamp(exponent, -500, 500));
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const double steps = all.low[axis] * frame.scale;
-    const bool resolved = std::abs(steps) < 0x1.0p53;
-    frame.origin[axis] = resolved ? std::floor(steps) / frame.scale : all.low[axis];
-  }
-  return frame;
+      [](const VertexBox& a, const VertexBox& b) { return united(a, b); }, kParallelGrain);
 }
 
 /// Elements of one kind that belong to cloth, or to obstacles.
@@ -103,9 +89,9 @@ struct Body {
   Body(const Surface& surface, bool cloth)
       : first(cloth ? 0 : static_cast<std::size_t>(surface.num_cloth_vertices)),
         end(static_cast<std::size_t>(cloth ? surface.num_cloth_vertices : surface.num_vertices)),
-        vertices(elements_of(all_vertices(surface), surface, cloth), false),
-        edges(elements_of(surface.edges, surface, cloth), true),
-        triangles(elements_of(surface.triangles, surface, cloth), false) {}
+        vertices(elements_of(all_vertices(surface), surface, cloth), 0),
+        edges(elements_of(surface.edges, surface, cloth), surface.edges.size()),
+        triangles(elements_of(surface.triangles, surface, cloth), 0) {}
 
   std::array<BoxBlocks*, 3> kinds() { return {&vertices, &edges, &triangles}; }
 
@@ -232,14 +218,14 @@ const CandidatePairs& BroadPhase::find(std::span<const VertexBox> boxes, double 
   self.report = {};
   if (self.surface.num_cloth_vertices == 0) return self.pairs;
   Stopwatch watch;
-  const UnitFrame frame = frame_around(boxes.first(self.cloth.end));
+  const UnitFrame frame(united(boxes.first(self.cloth.end)), gap);
   self.update(boxes, frame);
   self.report.build_ms = watch.lap();
 
   self.boxes_now = boxes;
   self.gap_now = gap;
   const BoxKernels& kernels = box_kernels(best_isa());
-  const Reach reach = reach_of(gap, frame);
+  const Reach reach = frame.reach();
   self.report.box_tests =
       self.vertices.run(kernels.vertices_with_triangles, kernels, reach,
                         {&self, Impl::vertex_near_triangle}, self.pairs.vertex_triangle) +

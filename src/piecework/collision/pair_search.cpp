@@ -7,18 +7,17 @@
 namespace piecework::collision {
 namespace {
 
-constexpr std::size_t kMostStripes = 256;  // enough for balance, few enough for their buffers
+constexpr std::size_t kMostStripes = 128;  // enough for balance, few enough for their buffers
 constexpr int kShortList = 64;             // longer ones are not sorted by counting
 
 /// Bounds of a block, to be compared with the numbers of a node.
-BoxRow bounds_of(const BoxRow& box, float outer) {
+BoxRow bounds_of(const BoxRow& box, int outer) {
   BoxRow q;
-  for (int k = 0; k < 3; ++k) {
-    q.number[k] = outer - box.number[3 + k];
-    q.number[3 + k] = outer - box.number[k];
-  }
-  q.number[6] = -box.number[7];
-  q.number[7] = __builtin_inff();
+  for (int k = 0; k < 6; ++k)
+    q.number[k] = static_cast<short>(
+        std::clamp<int>(outer - box.number[(k + 3) % 6], kEmptyBound, kMostNumber));
+  q.number[6] = static_cast<short>(-box.number[7]);
+  q.number[7] = kEmptyNumber;  // not compared
   return q;
 }
 

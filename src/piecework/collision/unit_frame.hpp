@@ -1,6 +1,8 @@
 #pragma once
 
-// From boxes in metres to those of single precision. Private to `collision`.
+// From boxes in metres to those in steps. Private to `collision`.
+
+#include <cmath>
 
 #include <piecework/collision/broad_phase.hpp>
 
@@ -15,42 +17,62 @@ inline BoxRow united(const BoxRow& a, const BoxRow& b) {
   return r;
 }
 
-/// The coordinates of single precision: (x - origin) * scale, clamped to +-kClamp.
-///
-/// The cloth lies in [0, 2]^3. Obstacles may lie anywhere, but only what comes within `gap` of the
-/// cloth matters; gaps are cut to kMaxGap, beyond which everything clamped is within reach anyway
-/// or never. So the rounding of coordinates is a fixed fraction of the cloth's size.
-struct UnitFrame {
-  static constexpr double kClamp = 16, kMaxGap = 8;
-
-  Vec3 origin = Vec3::Zero();  ///< m
-  double scale = 1;            ///< 1/m, a power of two
+/// A grid that ends somewhat more than the gap around the cloth. Obstacles may lie anywhere: what
+/// is outside is moved to the border, which is out of reach of all cloth.
+class UnitFrame {
+ public:
+  /// \param cloth  around all boxes of cloth
+  /// \param gap    m
+  UnitFrame(const VertexBox& cloth, double gap) {
+    // Sizes and corners are rounded, so that the frame, and with it the rows of obstacles at rest,
+    // stay the same while little moves.
+    int exponent = 0;
+    const double mantissa = std::frexp((cloth.high - cloth.low).maxCoeff() + 2 * gap, &exponent);
+    const double size = std::ldexp(mantissa > 0 ? std::ceil(8 * mantissa) / 8 : 1,
+                                   exponent < -900 ? -900 : exponent);
+    steps_per_metre_ = kSteps / (1.125 * size);
+    gap_ = gap * steps_per_metre_;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const double low = cloth.low[axis] - gap, corners = low / (size / 8);
+      // Very far from the origin rounding would move the corner.
+      origin_[axis] = std::abs(corners) < 0x1.0p40 ? std::floor(corners) * (size / 8) : low;
+    }
+  }
 
   [[nodiscard]] BoxRow row(const VertexBox& box) const {
     BoxRow r{};
     for (int axis = 0; axis < 3; ++axis) {
-      r.number[axis] = coordinate(box.low[axis], axis);
-      r.number[3 + axis] = -coordinate(box.high[axis], axis);
+      r.number[axis] = down(step(box.low[axis], axis));
+      r.number[3 + axis] = down(-step(box.high[axis], axis));
     }
     return r;
   }
 
-  bool operator==(const UnitFrame& other) const {
-    return origin == other.origin && scale == other.scale;
+  /// Rounding down takes up to one step from each of the two numbers that a comparison adds. The
+  /// slack is for the rounding of doubles.
+  [[nodiscard]] Reach reach() const {
+    constexpr double slack = 1e-6;
+    return {static_cast<int>(std::floor(gap_ + slack)),
+            static_cast<int>(std::floor(gap_ - 2 - slack))};
   }
 
  private:
-  [[nodiscard]] float coordinate(double x, int axis) const {
-    const double unit = (x - origin[axis]) * scale;
-    return static_cast<float>(unit < -kClamp ? -kClamp : unit > kClamp ? kClamp : unit);
-  }
-};
+  static constexpr double kSteps = 65400;  // a little less than 2 kMostNumber
 
-/// \param gap  m
-inline Reach reach_of(double gap, const UnitFrame& frame) {
-  const double g = gap * frame.scale < UnitFrame::kMaxGap ? gap * frame.scale : UnitFrame::kMaxGap;
-  const double doubt = 0x1.0p-21 * (2 + 2 * g);
-  return {static_cast<float>(g + doubt), static_cast<float>(g - doubt)};
-}
+  [[nodiscard]] double step(double x, int axis) const {
+    return (x - origin_[axis]) * steps_per_metre_ - kSteps / 2;
+  }
+  static short down(double steps) {
+    const double inside = steps < -kMostNumber  ? -kMostNumber
+                          : steps > kMostNumber ? kMostNumber
+                                                : steps;
+    // Truncation towards zero of a positive number, then back: std::floor is a call without SSE4.
+    return static_cast<short>(static_cast<int>(inside + 65536) - 65536);
+  }
+
+  Vec3 origin_ = Vec3::Zero();  // m
+  double steps_per_metre_ = 1;
+  double gap_ = 0;  // steps
+};
 
 }  // namespace piecework::collision

@@ -1,4 +1,4 @@
-#include "morton.hpp"
+#include "space_curve.hpp"
 
 #include <algorithm>
 #include <array>
@@ -53,8 +53,28 @@ void sort_by_digit(const std::vector<std::uint64_t>& from, std::vector<std::uint
 
 }  // namespace
 
-std::uint32_t morton_code(float x, float y, float z) {
-  return spread(cell(x)) << 2 | spread(cell(y)) << 1 | spread(cell(z));
+/// [Skilling 2004], for three axes: reflections and exchanges of axes from the first bit to the
+/// last, then Gray's code.
+std::uint32_t hilbert_code(float x, float y, float z) {
+  std::array<std::uint32_t, 3> c{cell(x), cell(y), cell(z)};
+  for (std::uint32_t bit = kValues / 2; bit > 1; bit /= 2) {
+    const std::uint32_t below = bit - 1;
+    for (std::uint32_t& axis : c) {
+      const std::uint32_t exchange = (c[0] ^ axis) & below;
+      if ((axis & bit) != 0) {
+        c[0] ^= below;
+      } else {
+        c[0] ^= exchange;
+        axis ^= exchange;
+      }
+    }
+  }
+  c[1] ^= c[0];
+  c[2] ^= c[1];
+  std::uint32_t flip = 0;
+  for (std::uint32_t bit = kValues / 2; bit > 1; bit /= 2)
+    if ((c[2] & bit) != 0) flip ^= bit - 1;
+  return spread(c[0] ^ flip) << 2 | spread(c[1] ^ flip) << 1 | spread(c[2] ^ flip);
 }
 
 void sort_by_code(std::vector<std::uint64_t>& keys, std::vector<std::uint64_t>& spare) {
