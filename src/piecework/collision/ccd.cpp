@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
@@ -22,49 +21,49 @@ namespace piecework::collision {
 namespace {
 
 constexpr double kUnit = 0x1p-53;  // relative error of one rounding
-constexpr double kSmallest = 1e-45, kLargest = 1e45;  // squares of volumes neither under nor overflow
-constexpr int kMaxAxes = 256;
-constexpr int kMaxSteps = 24;  // of Halley or Newton before bisection takes over
+constexpr double kSmallest = 1e-45,
+                 kLargest = 1e45;  // squares of volumes neither under nor overflow
+constexpr int kMaxRootSteps = 24;  // of Halley or Newton before bisection takes over
+constexpr int kMaxSteps = 256;     // of conservative advancement before it stops, which is a hit
+constexpr double kSlow =
+    0.5;  // a step longer than this part of the last one: the sequence converges slowly
 
 /// Differences between each vertex of the first element and each of the second, at both ends of
 /// the motion. Taken between given numbers, each has one rounding error, relative to itself; hence
 /// a common translation, however far, costs no accuracy.
 struct Motion {
   PairKind kind;
-  int count;  ///< 3 for VT, 4 for EE
   std::array<Vec3, 4> start, end;
-  double size;  ///< largest |coordinate| in them
+  double size;      ///< largest |coordinate| in them
+  bool computable;  ///< all are finite and neither too small nor too large
 };
 
-int differences(PairKind kind, const PairPoints& x, std::array<Vec3, 4>& d) {
-  if (kind == PairKind::VertexTriangle) {
-    d = {x[0] - x[1], x[0] - x[2], x[0] - x[3], Vec3::Zero()};
-    return 3;
-  }
-  d = {x[0] - x[2], x[0] - x[3], x[1] - x[2], x[1] - x[3]};
-  return 4;
+std::array<Vec3, 4> differences(PairKind kind, const PairPoints& x) {
+  // The last one of VT is there twice: four of either kind need no branches.
+  if (kind == PairKind::VertexTriangle) return {x[0] - x[1], x[0] - x[2], x[0] - x[3], x[0] - x[3]};
+  return {x[0] - x[2], x[0] - x[3], x[1] - x[2], x[1] - x[3]};
 }
 
 Motion relative_motion(PairKind kind, const PairPoints& start, const PairPoints& end) {
-  Motion m;
-  m.kind = kind;
-  m.count = differences(kind, start, m.start);
-  differences(kind, end, m.end);
-  double size = 0;
-  bool finite = true;
-  for (const auto* side : {&m.start, &m.end})
-    for (const Vec3& d : *side)
-      for (int k = 0; k < 3; ++k) {
-        size = std::max(size, std::abs(d[k]));
-        finite &= std::isfinite(d[k]);
-      }
-  m.size = finite ? size : std::numeric_limits<double>::infinity();
+  Motion m{kind, differences(kind, start), differences(kind, end), 0, false};
+  Vec3 largest = Vec3::Zero(), total = Vec3::Zero();
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Vec3 a = m.start[k].cwiseAbs(), b = m.end[k].cwiseAbs();
+    largest = largest.cwiseMax(a.cwiseMax(b));
+    total += a + b;
+  }
+  m.size = largest.maxCoeff();
+  m.computable = m.size > kSmallest && total.sum() < kLargest;  // false for NaN
   return m;
+}
+
+Vec3 difference_at(const Motion& m, std::size_t k, double t) {
+  return (1 - t) * m.start[k] + t * m.end[k];
 }
 
 /// The pair at time t with its first vertex at the origin.
 PairPoints points_at(const Motion& m, double t) {
-  const auto d = [&](std::size_t k) -> Vec3 { return (1 - t) * m.start[k] + t * m.end[k]; };
+  const auto d = [&](std::size_t k) { return difference_at(m, k, t); };
   if (m.kind == PairKind::VertexTriangle) return {Vec3::Zero(), -d(0), -d(1), -d(2)};
   return {Vec3::Zero(), d(2) - d(0), -d(0), -d(1)};
 }
@@ -78,12 +77,35 @@ double separated_until(const Motion& m, const Vec3& axis, double t, double separ
   double limit = 16 * kUnit * reach;
   if (separation > 0) limit += (1 + 8 * kUnit) * separation * axis.norm();
   double until = 1;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(m.count); ++k) {
+  for (std::size_t k = 0; k < 4; ++k) {
     const double a = axis.dot(m.start[k]), b = axis.dot(m.end[k]);
     if (!((1 - t) * a + t * b > limit)) return t;
     if (b <= limit) until = std::min(until, (1 - 8 * kUnit) * ((a - limit) / (a - b)));
   }
   return std::max(until, t);
+}
+
+/// Whether an axis that turns from one unit vector to another between two times proves that the
+/// distance exceeds `separation` all the while. With an axis a + s (b - a), no longer than 1, the
+/// separations are quadratic in s, and above their lowest Bernstein coefficient.
+bool separated_between(const Motion& m, const Vec3& first, double t0, const Vec3& second, double t1,
+                       double separation) {
+  const double limit = (1 + 8 * kUnit) * separation + 32 * kUnit * m.size;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Vec3 d0 = difference_at(m, k, t0), d1 = difference_at(m, k, t1);
+    const double middle = 0.5 * (first.dot(d1) + second.dot(d0));
+    // Each compared by itself: NaN must not get lost in a minimum.
+    if (!(first.dot(d0) > limit && middle > limit && second.dot(d1) > limit)) return false;
+  }
+  return true;
+}
+
+/// A multiple of the offset from the mean of the second element's vertices to that of the first's,
+/// at both ends together (VT: nearly): where elements are apart, a cheap and often a good axis.
+Vec3 axis_between_centres(const Motion& m) {
+  Vec3 sum = m.start[0] + m.end[0];
+  for (std::size_t k = 1; k < 4; ++k) sum += m.start[k] + m.end[k];
+  return sum;
 }
 
 /// c[0] + c[1] t + c[2] t^2 + c[3] t^3.
@@ -134,7 +156,7 @@ double last_above_zero(const Cubic& f, double low, double high, const CcdOptions
   const double at_low = f(low), at_high = f(high);
   double t = low + (high - low) * (at_low / (at_low - at_high));
   for (int step = 0;; ++step) {
-    if (!(low < t && t < high) || step > kMaxSteps) t = 0.5 * (low + high);
+    if (!(low < t && t < high) || step > kMaxRootSteps) t = 0.5 * (low + high);
     const double value = f(t);
     ++evaluations;
     (value > 0 ? low : high) = t;
@@ -174,14 +196,31 @@ class Search {
 
   /// Advances from `from` to `to`, axis by axis; stops early where `left(t)`, which says that
   /// contact has become impossible again. True when it cannot go on: a hit.
+  ///
+  /// A fixed axis is worth little where the elements turn or graze. Where its steps hardly shrink,
+  /// longer ones are tried with an axis that turns, ever longer while that succeeds.
   template <class Left>
   bool meets(double from, double to, const Left& left) {
-    double t = from;
-    for (int axes = 0; axes < kMaxAxes; ++axes) {
-      const double until = advance(t);
+    double t = from, last_step = 1, stretch = 2;
+    Vec3 axis = axis_at(t);
+    for (int steps = 0; steps < kMaxSteps; ++steps) {
+      const double until = separated_until(motion_, axis, t, options_.min_separation);
       if (until >= to) return false;
-      if (until <= t + tolerance_) break;
-      t = until;
+      const double step = until - t;
+      if (step <= tolerance_) break;
+      double next = until;
+      if (step > kSlow * last_step) {
+        const double ahead = std::min(to, t + stretch * step);
+        const Vec3 turned = axis_at(ahead);
+        if (separated_between(motion_, axis, t, turned, ahead, options_.min_separation)) {
+          if (ahead >= to) return false;
+          next = ahead, axis = turned, stretch *= 2;
+        } else {
+          stretch = 2;
+        }
+      }
+      if (next == until) axis = axis_at(until);
+      last_step = step, t = next;
       result_.additive = true;
       if (left(t)) return false;
     }
@@ -208,10 +247,11 @@ class Search {
   [[nodiscard]] const CcdResult& result() const { return result_; }
 
  private:
-  double advance(double t) {
+  /// Unit vector between the closest points, NaN if they coincide.
+  Vec3 axis_at(double t) {
     ++result_.evaluations;
     const Closest c = closest(motion_.kind, points_at(motion_, t));
-    return separated_until(motion_, c.offset, t, options_.min_separation);
+    return c.offset / std::sqrt(c.distance_sq);
   }
 
   const Motion& motion_;
@@ -225,7 +265,9 @@ class Search {
 CcdResult first_contact(PairKind kind, const PairPoints& start, const PairPoints& end,
                         const CcdOptions& options) {
   const Motion motion = relative_motion(kind, start, end);
-  if (!(motion.size > kSmallest && motion.size < kLargest)) return {.hit = true, .time = 0};
+  if (!motion.computable) return {.hit = true, .time = 0};
+  if (separated_until(motion, axis_between_centres(motion), 0, options.min_separation) >= 1)
+    return {.evaluations = 1};
   Search search(motion, options);
   if (options.min_separation > 0 || options.method == CcdMethod::Additive) {
     search.meets(0, 1, [](double) { return false; });

@@ -59,8 +59,7 @@ TEST(Ccd, PassingThePlaneOutsideIsNoMeeting) {
   start[0].x() = end[0].x() = 0.81;  // beyond the long side by 0.01 / sqrt(2)
   expect_miss(kVt, start, end);
   start = kCrossed, end = kUncrossed;
-  for (PairPoints* x : {&start, &end})
-    (*x)[0].x() = 0.01;  // the edge begins beside the other
+  for (PairPoints* x : {&start, &end}) (*x)[0].x() = 0.01;  // the edge begins beside the other
   expect_miss(kEe, start, end);
 }
 
@@ -120,8 +119,8 @@ TEST(Ccd, MinimumSeparationIsMetWhenItIsReached) {
 }
 
 TEST(Ccd, WhatCannotBeComputedIsAHitAtOnce) {
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
-                           std::numeric_limits<double>::infinity(), 1e50}) {
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e50}) {
     PairPoints end = kAbove;
     end[2].y() = bad;
     const CcdResult r = first_contact(kVt, kAbove, end, {});
