@@ -140,13 +140,18 @@ class Factorizer {
   bool eliminate(int f, const FrontMatrix<N>& matrix, bool tiled, Scratch& scratch);
   static void copy_update(const FrontMatrix<N>& matrix, N* out);
   void keep_update(int f, const FrontMatrix<N>& matrix);
-  void update_trailing(const FrontMatrix<N>& matrix, int first, int end, bool tiled);
+  void update_trailing(const FrontMatrix<N>& matrix, int first, int end, int last, bool tiled);
   void store_panel(std::size_t p, const FrontMatrix<N>& matrix, double diagonal, Scratch& scratch);
   void pack(const N* from, int ld, int rows, int cols, N sign, T* to) const;
   void note(const FactorOutcome& part, FactorOutcome& whole) const;
 
   [[nodiscard]] bool in_scope(int f) const {
     return scope_.changed.empty() || scope_.changed[static_cast<std::size_t>(f)] != 0;
+  }
+
+  [[nodiscard]] bool frozen(int f) const {
+    return !scope_.changed.empty() && !scope_.frozen.empty() &&
+           scope_.frozen[static_cast<std::size_t>(f)] != 0;
   }
 
   const NumericInput& input_;
@@ -214,17 +219,20 @@ void Factorizer<T, N>::extend_add(int child, const N* update, int parent,
                       runs.data(), static_cast<int>(runs.size()));
 }
 
-/// Lower triangle of everything from row and column `end` on -= L L^T with L's columns
+/// Lower triangle of columns end ... last - 1 and the rows below -= L L^T with L's columns
 /// first ... end - 1.
 template <class T, class N>
-void Factorizer<T, N>::update_trailing(const FrontMatrix<N>& matrix, int first, int end,
+void Factorizer<T, N>::update_trailing(const FrontMatrix<N>& matrix, int first, int end, int last,
                                        bool tiled) {
   const int rest = matrix.size() - end;
   const int depth = end - first;
-  if (rest == 0) return;
+  if (last == end) return;
   if (!tiled) {
-    dense::subtract_square<N>(rest, depth, matrix.at(end, first), matrix.stride(),
+    dense::subtract_square<N>(last - end, depth, matrix.at(end, first), matrix.stride(),
                               matrix.at(end, end), matrix.stride());
+    dense::subtract_product<N>(matrix.size() - last, last - end, depth, matrix.at(last, first),
+                               matrix.stride(), matrix.at(end, first), matrix.stride(),
+                               matrix.at(last, end), matrix.stride());
     return;
   }
   const int blocks = (rest + kTile - 1) / kTile;
@@ -239,8 +247,9 @@ void Factorizer<T, N>::update_trailing(const FrontMatrix<N>& matrix, int first, 
         const int r = end + row * kTile;
         const int c = end + column * kTile;
         const int rows = std::min(kTile, matrix.size() - r);
-        const int cols = std::min(kTile, matrix.size() - c);
-        if (row == column)
+        const int cols = std::min(kTile, last - c);
+        if (cols <= 0) return;
+        if (row == column && cols == rows)
           dense::subtract_square<N>(rows, depth, matrix.at(r, first), matrix.stride(),
                                     matrix.at(r, c), matrix.stride());
         else
@@ -319,6 +328,7 @@ template <class T, class N>
 bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled,
                                  Scratch& scratch) {
   const FrontPlan& plan = plan_.fronts[static_cast<std::size_t>(f)];
+  const int last = frozen(f) ? matrix.width : matrix.size();
   N* work = scratch.transposed_of(8 * static_cast<std::size_t>(matrix.size()));
   for (int k = 0; k < plan.num_panels; ++k) {
     const std::size_t p = plan.first_panel + static_cast<std::size_t>(k);
@@ -329,7 +339,7 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
       diagonal = std::max(diagonal, static_cast<double>(*matrix.at(c, c)));
     const bool small = matrix.size() <= kSmallFront;
     if (!kernels_.eliminate(matrix.at(0, 0), matrix.size(), matrix.stride(), panel.first, end,
-                            small ? matrix.size() : end, work))
+                            small ? last : end, work))
       return false;
     for (int c = panel.first; c < end; ++c) {
       const auto pivot = static_cast<double>(*matrix.at(c, c));
@@ -339,7 +349,7 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
           std::min(scratch.outcome.smallest_pivot,
                    pivot * pivot / input_.diagonal[static_cast<std::size_t>(front(f).first + c)]);
     }
-    if (!small) update_trailing(matrix, panel.first, end, tiled);
+    if (!small) update_trailing(matrix, panel.first, end, last, tiled);
     store_panel(p, matrix, diagonal, scratch);
   }
   return true;
@@ -357,6 +367,7 @@ void Factorizer<T, N>::copy_update(const FrontMatrix<N>& matrix, N* out) {
 
 template <class T, class N>
 void Factorizer<T, N>::keep_update(int f, const FrontMatrix<N>& matrix) {
+  if (frozen(f)) return;
   const auto rows = static_cast<std::size_t>(matrix.rows);
   auto& update = updates_[static_cast<std::size_t>(f)];
   update = AlignedArray<N>(rows * rows);

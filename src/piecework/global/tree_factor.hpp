@@ -76,6 +76,8 @@ struct Scope {
   /// Per front: its entries or those of a front below it have changed. Empty: all.
   std::span<const char> changed;
   bool keep_updates = false;  ///< for a later call with `changed`
+  /// Per front, or empty: with `changed`, its update matrix stays what it is.
+  std::span<const char> frozen;
 };
 
 /// Factors. On failure the factor's contents are void. Parallel over subtrees, then over the fronts

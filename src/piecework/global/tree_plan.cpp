@@ -1,6 +1,8 @@
 #include "tree_plan.hpp"
 
 #include <algorithm>
+#include <queue>
+#include <utility>
 
 namespace piecework::global {
 namespace {
@@ -238,6 +240,32 @@ void Planner::find_runs() {
 TreePlan plan_tree(const Symbolic& symbolic, const PlanOptions& options,
                    const PanelLayout& layout) {
   return Planner(symbolic, options, layout).build();
+}
+
+std::vector<char> interior_roots(const Symbolic& symbolic, const TreePlan& plan, int count) {
+  if (count <= 0) return {};
+  std::vector<int> columns(symbolic.fronts.size());
+  std::vector<char> result(symbolic.fronts.size(), 0);
+  std::priority_queue<std::pair<int, int>> open;  // the largest interior is divided next
+  for (std::size_t f = 0; f < symbolic.fronts.size(); ++f) {
+    columns[f] = symbolic.fronts[f].width;
+    for (const int child : plan.children[f]) columns[f] += columns[static_cast<std::size_t>(child)];
+    if (symbolic.fronts[f].parent < 0) open.emplace(columns[f], static_cast<int>(f));
+  }
+  int chosen = 0;
+  while (!open.empty()) {
+    const auto f = static_cast<std::size_t>(open.top().second);
+    const bool enough = chosen + static_cast<int>(open.size()) >= count;
+    open.pop();
+    if (enough || plan.fronts[f].subtree >= 0) {
+      result[f] = 1;
+      ++chosen;
+    } else {
+      for (const int child : plan.children[f])
+        open.emplace(columns[static_cast<std::size_t>(child)], child);
+    }
+  }
+  return result;
 }
 
 }  // namespace piecework::global

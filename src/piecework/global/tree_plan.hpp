@@ -75,4 +75,8 @@ struct TreePlan {
 
 TreePlan plan_tree(const Symbolic& symbolic, const PlanOptions& options, const PanelLayout& layout);
 
+/// Flags of fronts, none below another, whose subtrees are the interiors of at least `count`
+/// domains; fronts inside the plan's subtrees are never chosen. 0: no flags.
+std::vector<char> interior_roots(const Symbolic& symbolic, const TreePlan& plan, int count);
+
 }  // namespace piecework::global

@@ -170,6 +170,25 @@ struct TreeSolver::Impl {
     report.subtrees = static_cast<int>(plan.subtrees.size());
     report.levels = static_cast<int>(plan.levels.size());
     report.precision = sizeof(T) == 4 ? Precision::Single : Precision::Double;
+    frozen = interior_roots(structure->symbolic, plan, options.frozen_interiors);
+  }
+
+  /// Rows of the fronts in scope; a subtree is redone as a whole. Empty: all.
+  [[nodiscard]] int rows_in_scope(std::span<const char> changed) const {
+    const std::vector<Front>& fronts = structure->symbolic.fronts;
+    if (changed.empty()) return structure->symbolic.size();
+    int rows = 0;
+    with_engine([&](const auto& engine) {
+      for (std::size_t f = 0; f < fronts.size(); ++f) {
+        const int subtree = engine.plan.fronts[f].subtree;
+        const auto root =
+            subtree < 0 ? f
+                        : static_cast<std::size_t>(
+                              engine.plan.subtrees[static_cast<std::size_t>(subtree)].last_front);
+        if (changed[root]) rows += fronts[f].width;
+      }
+    });
+    return rows;
   }
 
   template <class N>
@@ -194,7 +213,7 @@ struct TreeSolver::Impl {
                              engine<T>().kernel_table.layout,
                              isa,
                              condition_limit()};
-    const Scope scope{changed, options.partial_refactor};
+    const Scope scope{changed, options.partial_refactor, frozen};
     FactorOutcome outcome = factor_tree<T, N>(input, scope, engine<T>().factor, updates<N>());
     // A singular matrix leaves pivots of rounding error. In 32 bits the contraction tells.
     const double rounding = std::numeric_limits<double>::epsilon() * kPivotRounding *
@@ -204,6 +223,7 @@ struct TreeSolver::Impl {
     factored = outcome.status == SolveStatus::Ok;
     report.substituted_panels = engine<T>().factor.num_substituted();
     report.max_condition = outcome.max_condition;
+    report.factored_rows = rows_in_scope(changed);
     const double ratio = outcome.min_pivot / outcome.max_pivot;
     report.reciprocal_condition = factored && outcome.max_pivot > 0 ? ratio * ratio : 0;
     return outcome.status;
@@ -228,7 +248,7 @@ struct TreeSolver::Impl {
   }
 
   template <class Function>
-  void with_engine(const Function& function) {
+  void with_engine(const Function& function) const {
     std::visit(
         [&](auto& engine) {
           if constexpr (!std::is_same_v<std::decay_t<decltype(engine)>, std::monostate>)
@@ -273,6 +293,7 @@ struct TreeSolver::Impl {
   UpdateMatrices<double> double_updates;
   std::variant<std::monostate, std::unique_ptr<Engine<float>>, std::unique_ptr<Engine<double>>>
       engine_;
+  std::vector<char> frozen;  ///< per front, or empty: roots of interiors
   bool factored = false;
   TreeReport report;
 };
@@ -393,7 +414,8 @@ SolveStatus TreeSolver::refactor_rows(std::span<const double> values, std::span<
     changed[static_cast<std::size_t>(structure.front_of[static_cast<std::size_t>(row)])] = 1;
   }
   for (std::size_t f = 0; f < changed.size(); ++f)  // children come before their parents
-    if (const int parent = structure.symbolic.fronts[f].parent; changed[f] && parent >= 0)
+    if (const int parent = structure.symbolic.fronts[f].parent;
+        changed[f] && parent >= 0 && (impl.frozen.empty() || !impl.frozen[f]))
       changed[static_cast<std::size_t>(parent)] = 1;
   try {
     const SolveStatus status = impl.factor_as_asked(values, changed);

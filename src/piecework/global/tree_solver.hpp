@@ -39,6 +39,10 @@ struct TreeOptions {
   std::optional<double> condition_limit;
   /// Keep what refactor_rows() needs between factorisations.
   bool partial_refactor = false;
+  /// With partial_refactor: the tree's top is seen as the interface of at least so many interiors,
+  /// and refactor_rows() leaves what eliminating them does to it as the last factor() had it: the
+  /// result is the factor of an approximation, a preconditioner. 0: exact.
+  int frozen_interiors = 0;
   std::optional<Isa> isa;  ///< default: the best one of this processor
   int seed = 1;            ///< of METIS
 };
@@ -50,6 +54,7 @@ struct TreeReport : FactorReport {
   int subtrees = 0;  ///< parallel tasks below the top of the tree
   int levels = 0;    ///< of the top: barriers per sweep
   int panels = 0;
+  int factored_rows = 0;       ///< whose columns the newest factorisation computed
   int substituted_panels = 0;  ///< ill-conditioned, see TreeOptions::condition_limit
   double max_condition = 0;    ///< largest condition of an inverted pivot block, estimated
   Precision precision = Precision::Double;  ///< in use
@@ -91,8 +96,9 @@ class TreeSolver {
 
   /// Factors anew where values have changed since the last factorisation: in the given rows and
   /// their columns. The same numbers as factor(), which it becomes without
-  /// TreeOptions::partial_refactor. In 32 bits the contraction is not estimated again.
-  /// \throws InputError as factor(), and if a row is out of range.
+  /// TreeOptions::partial_refactor (see frozen_interiors for the exception). In 32 bits the
+  /// contraction is not estimated again. \throws InputError as factor(), and if a row is out of
+  /// range.
   [[nodiscard]] SolveStatus refactor_rows(std::span<const double> values,
                                           std::span<const int> rows);
 
