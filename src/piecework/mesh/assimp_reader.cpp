@@ -1,74 +1,22 @@
 #include <piecework/mesh/assimp_reader.hpp>
 
-#include <algorithm>
-#include <cstdint>
-#include <cstring>
 #include <span>
 #include <string_view>
-#include <type_traits>
 #include <vector>
 
-#include <assimp/DefaultIOSystem.h>
-#include <assimp/importerdesc.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
 #include <assimp/Importer.hpp>
 
 #include <piecework/core/error.hpp>
+#include <piecework/mesh/assimp_guard.hpp>
 #include <piecework/mesh/child_process.hpp>
+#include <piecework/mesh/packing.hpp>
 
 namespace piecework::mesh {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr const char* kExportAgain =
-    "the file is probably corrupt: export it again or convert it to OBJ";
-
-/// Opens regular files in the mesh's folder and below only, whatever the file asks for.
-class FolderIOSystem : public Assimp::DefaultIOSystem {
- public:
-  explicit FolderIOSystem(const fs::path& folder) : folder_(fs::weakly_canonical(folder)) {}
-
-  bool Exists(const char* file) const override {
-    return is_allowed(file) && DefaultIOSystem::Exists(file);
-  }
-  Assimp::IOStream* Open(const char* file, const char* mode) override {
-    return is_allowed(file) ? DefaultIOSystem::Open(file, mode) : nullptr;
-  }
-
- private:
-  [[nodiscard]] bool is_allowed(const char* file) const {
-    std::error_code error;
-    const fs::path real = fs::canonical(file, error);
-    if (error || !fs::is_regular_file(real, error)) return false;
-    const fs::path relative = real.lexically_relative(folder_);
-    return !relative.empty() && *relative.begin() != "..";
-  }
-
-  fs::path folder_;
-};
-
-bool handles(const aiImporterDesc& description, std::string_view extension) {
-  std::string_view list = description.mFileExtensions;
-  while (!list.empty()) {
-    const std::size_t end = list.find(' ');
-    if (list.substr(0, end) == extension.substr(1)) return true;
-    list.remove_prefix(end == std::string_view::npos ? list.size() : end + 1);
-  }
-  return false;
-}
-
-/// Leaves only the importers of one extension: assimp otherwise tries others on odd content.
-void keep_importers(Assimp::Importer& importer, std::string_view extension) {
-  std::vector<Assimp::BaseImporter*> others;
-  for (std::size_t i = 0; i < importer.GetImporterCount(); ++i) {
-    const aiImporterDesc* description = importer.GetImporterInfo(i);
-    if (description == nullptr || !handles(*description, extension))
-      others.push_back(importer.GetImporter(i));
-  }
-  for (Assimp::BaseImporter* other : others) importer.UnregisterLoader(other);
-}
 
 /// Collects the meshes of a scene, node by node.
 class SceneCollector {
@@ -167,58 +115,6 @@ class SceneCollector {
   std::size_t num_skipped_ = 0;
 };
 
-/// Flat bytes of a RawMesh on its way from the child.
-class Packer {
- public:
-  template <class T>
-  void add(const std::vector<T>& items) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    add_bytes(items.data(), items.size(), sizeof(T));
-  }
-  void add(const std::string& text) { add_bytes(text.data(), text.size(), 1); }
-  /// Vectors of fixed-size Eigen vectors, whose elements are plain doubles.
-  template <int Size>
-  void add(const std::vector<Eigen::Matrix<double, Size, 1>>& items) {
-    add_bytes(items.data(), items.size(), sizeof(double) * Size);
-  }
-  std::string take() { return std::move(bytes_); }
-
- private:
-  void add_bytes(const void* data, std::size_t count, std::size_t item_size) {
-    const std::uint64_t number = count;
-    bytes_.append(reinterpret_cast<const char*>(&number), sizeof number);
-    if (count > 0) bytes_.append(static_cast<const char*>(data), count * item_size);
-  }
-  std::string bytes_;
-};
-
-/// Reads what Packer wrote; a damaged child may have written anything.
-class Unpacker {
- public:
-  Unpacker(const std::string& file, std::string_view bytes) : file_(file), bytes_(bytes) {}
-  template <class Items>
-  void get(Items& items) {
-    using Item = typename Items::value_type;
-    std::uint64_t count = 0;
-    copy(&count, sizeof count);
-    if (count > bytes_.size() / sizeof(Item)) fail();
-    items.resize(count);
-    copy(items.data(), count * sizeof(Item));
-  }
-
- private:
-  void copy(void* to, std::size_t size) {
-    if (size > bytes_.size()) fail();
-    if (size > 0) std::memcpy(to, bytes_.data(), size);
-    bytes_.remove_prefix(size);
-  }
-  [[noreturn]] void fail() const {
-    throw InputError(fmt::format("{}: crashes the reader; {}", file_, kExportAgain));
-  }
-  const std::string& file_;
-  std::string_view bytes_;
-};
-
 std::string pack(const RawMesh& raw) {
   Packer packer;
   packer.add(raw.positions);
@@ -267,29 +163,8 @@ RawMesh unpack(const std::string& file, std::string_view bytes, bool lists_verti
 std::string read_and_pack(const fs::path& path, const std::string& extension,
                           std::size_t max_triangles) {
   Assimp::Importer importer;
-  keep_importers(importer, extension);
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  importer.SetIOHandler(new FolderIOSystem(folder));  // owned by the importer
-  const aiScene* scene = importer.ReadFile(path.string(), 0);
-  if (scene == nullptr)
-    throw InputError(fmt::format("{}: cannot be read: {}; {}", path.string(),
-                                 importer.GetErrorString(), kExportAgain));
-  return pack(SceneCollector(path.string(), *scene, extension != ".stl", max_triangles).run());
-}
-
-/// Limits by the size of the file, so that a small hostile one cannot take minutes and gigabytes.
-/// Chosen generously: assimp needs up to about 40 bytes of memory per byte of file. A .gltf refers
-/// to data of unknown size and gets the defaults.
-ChildLimits limits_for(const fs::path& path, const std::string& extension) {
-  ChildLimits limits;
-  std::error_code error;
-  const std::uintmax_t bytes = fs::file_size(path, error);
-  if (error || extension == ".gltf") return limits;
-  constexpr std::uintmax_t kMebibyte = std::uintmax_t{1} << 20;
-  limits.memory_bytes =
-      std::min<std::uintmax_t>(limits.memory_bytes, 512 * kMebibyte + 200 * bytes);
-  limits.seconds = std::min(limits.seconds, static_cast<unsigned>(10 + bytes / kMebibyte));
-  return limits;
+  const aiScene& scene = read_guarded(importer, path, extension);
+  return pack(SceneCollector(path.string(), scene, extension != ".stl", max_triangles).run());
 }
 
 }  // namespace
@@ -298,7 +173,7 @@ RawMesh read_with_assimp(const fs::path& path, const std::string& extension,
                          std::size_t max_triangles) {
   const std::string bytes = run_in_child(
       path.string(), [&] { return read_and_pack(path, extension, max_triangles); },
-      limits_for(path, extension));
+      limits_for(path, extension == ".gltf"));
   return unpack(path.string(), bytes, extension != ".stl");
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@
 #include <piecework/mesh/grid.hpp>
 #include <piecework/mesh/import.hpp>
 #include <piecework/mesh/quilt.hpp>
+#include <piecework/mesh/solids.hpp>
 #include <piecework/mesh/topology.hpp>
 
 namespace piecework::mesh {
@@ -206,6 +208,43 @@ MeshDocument generate_quilt_document(const GeneratorOptions& o) {
   return generate_quilt(o);
 }
 
+MeshDocument body(TriangleMesh mesh) {
+  MeshDocument document;
+  document.mesh = std::move(mesh);
+  return document;
+}
+
+MeshDocument generate_round_body(GeneratorKind kind, const GeneratorOptions& o) {
+  check_size(kind, "radius", o.radius);
+  if (kind == GeneratorKind::Icosphere) {
+    check_count(kind, "rows", o.rows, 1);
+    check_triangles(kind, 10.0 * o.rows * o.rows);
+    return body(icosphere(o.radius, o.rows));
+  }
+  constexpr int kFewestColumns = 8;
+  check_count(kind, "columns", o.columns, kFewestColumns);
+  check_triangles(kind, 3.0 * o.columns * o.columns);
+  if (kind == GeneratorKind::Pot) return body(pot(o.radius, o.columns));
+  check_size(kind, "height", o.height);
+  check_aspect(kind, o.radius, o.height);
+  return body(funnel(o.radius, o.height, o.columns));
+}
+
+MeshDocument generate_block(GeneratorKind kind, const GeneratorOptions& o) {
+  check_size(kind, "width", o.width);
+  check_size(kind, "height", o.height);
+  check_size(kind, "depth", o.depth);
+  const Vec3 size(o.width, o.height, o.depth);
+  if (kind == GeneratorKind::Box) {
+    MeshDocument document = body(box(size));
+    document.mesh.positions.col(1).array() += 0.5 * o.height;
+    return document;
+  }
+  check_count(kind, "rows", o.rows, 1);
+  check_triangles(kind, 6.0 * o.rows);
+  return body(stairs(size, o.rows));
+}
+
 MeshDocument generate_kind(GeneratorKind kind, const GeneratorOptions& options) {
   switch (kind) {
     case GeneratorKind::Sheet:
@@ -215,6 +254,13 @@ MeshDocument generate_kind(GeneratorKind kind, const GeneratorOptions& options) 
       return generate_tube(options);
     case GeneratorKind::Disc:
       return generate_disc(options);
+    case GeneratorKind::Icosphere:
+    case GeneratorKind::Funnel:
+    case GeneratorKind::Pot:
+      return generate_round_body(kind, options);
+    case GeneratorKind::Box:
+    case GeneratorKind::Stairs:
+      return generate_block(kind, options);
     case GeneratorKind::Quilt:
       break;
   }
@@ -252,6 +298,16 @@ const char* to_string(GeneratorKind kind) {
       return "tube";
     case GeneratorKind::Disc:
       return "disc";
+    case GeneratorKind::Icosphere:
+      return "icosphere";
+    case GeneratorKind::Box:
+      return "box";
+    case GeneratorKind::Stairs:
+      return "stairs";
+    case GeneratorKind::Funnel:
+      return "funnel";
+    case GeneratorKind::Pot:
+      return "pot";
     case GeneratorKind::Quilt:
       break;
   }

@@ -1,6 +1,7 @@
 #pragma once
 
-// Built-in meshes: sheets, strips, tubes, discs, quilts. Deterministic in their parameters.
+// Built-in meshes: sheets, strips, tubes, discs, quilts; and closed bodies. Deterministic in their
+// parameters.
 
 #include <cstdint>
 #include <string>
@@ -19,10 +20,11 @@ enum class SheetPattern {
 /// Parameters of every generator; each uses the ones named in its line of GeneratorKind.
 struct GeneratorOptions {
   double width = 1.0;   ///< m, along x
-  double height = 1.0;  ///< m, along z (sheets), y (tube)
+  double height = 1.0;  ///< m, along z (sheets), y (tube, bodies)
+  double depth = 1.0;   ///< m, along z (box, stairs)
   int columns = 50;     ///< vertices along the width (tube: around)
   int rows = 50;        ///< vertices along the height (disc: rings)
-  double radius = 0.5;  ///< m; tube, disc
+  double radius = 0.5;  ///< m; tube, disc, icosphere, funnel, pot
   SheetPattern pattern = SheetPattern::Alternating;
   double jitter = 0.3;  ///< fraction of the cell by which inner vertices of Delaunay sheets move
   std::uint64_t seed = 1;
@@ -39,13 +41,19 @@ enum class GeneratorKind {
           ///< center
   Quilt,  ///< patches_x x patches_y sheets of width x height in all, each meshed with its own
           ///< density and pattern, conforming along shared borders, one group per patch
+  // Bodies (solids.hpp): closed, so that their set "border" is empty.
+  Icosphere,  ///< ball about the origin; radius, rows parts of each edge of the icosahedron
+  Box,        ///< width x height x depth on y = 0, its middle above the origin
+  Stairs,     ///< width x height x depth, rows steps that climb along +z from the origin
+  Funnel,     ///< radius, height, columns around; on y = 0
+  Pot,        ///< radius, columns around; on y = 0
 };
 
 /// \throws InputError with the parameter and its allowed range (fewer than 2 rows, non-positive or
 ///         non-finite sizes, more than kMaxTriangles triangles).
 MeshDocument generate(GeneratorKind kind, const GeneratorOptions& options);
 
-/// Names for the scene file: "sheet", "strip", "tube", "disc", "quilt"; "alternating", ...
+/// Names for the scene file: "sheet", "strip", ...; "alternating", ...
 const char* to_string(GeneratorKind kind);
 const char* to_string(SheetPattern pattern);
 

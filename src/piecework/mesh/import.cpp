@@ -1,11 +1,9 @@
 #include <piecework/mesh/import.hpp>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <numeric>
 #include <string>
-#include <system_error>
 
 #include <fmt/format.h>
 
@@ -13,6 +11,7 @@
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/assimp_reader.hpp>
 #include <piecework/mesh/checks.hpp>
+#include <piecework/mesh/input_file.hpp>
 #include <piecework/mesh/obj_reader.hpp>
 #include <piecework/mesh/repair.hpp>
 #include <piecework/mesh/topology.hpp>
@@ -23,25 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-void check_file(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status))
-    throw InputError(fmt::format("{}: file not found; correct the path", path.string()));
-  if (!fs::is_regular_file(status))
-    throw InputError(fmt::format("{}: not a regular file; name a mesh file", path.string()));
-  if (fs::file_size(path, error) == 0)
-    throw InputError(fmt::format("{}: file is empty; export the mesh again", path.string()));
-}
-
 RawMesh read_raw(const fs::path& path, std::size_t max_triangles) {
-  const std::string extension = lower_case(path.extension().string());
+  const std::string extension = lower_extension(path);
   const bool is_obj = extension == ".obj";
   if (!is_obj && extension != ".ply" && extension != ".stl" && extension != ".gltf" &&
       extension != ".glb")
