@@ -146,6 +146,7 @@ void Contact::hold_at(double fraction) {
 
 double Contact::start(Positions& x) {
   bodies_.start(*problem_->previous, *problem_->fixed, x);
+  if (!obstacles_.are_static()) carry(x);
   between(obstacle_begin_, obstacle_end_, 1, obstacle_now_);
   fraction_ = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
   report_.held_back = 1 - fraction_;

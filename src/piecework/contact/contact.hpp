@@ -95,6 +95,8 @@ class Contact final : public model::ContactTerms {
   void take_scales();
   void lower_scale(int vertex, double scale);
   void go(const Points& from, Positions& to, Positions& obstacles);
+  /// Takes vertices in x along with the moving obstacles that they are near.
+  void carry(Positions& x);
   [[nodiscard]] bool is_held(int v) const;
   void find_active(const Positions& x);
   void find_active_pairs(std::span<const NearPair> pairs, const Points& points);

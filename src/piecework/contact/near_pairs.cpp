@@ -10,6 +10,8 @@ namespace piecework::contact {
 namespace {
 
 constexpr std::size_t kPairsPerBlock = 2048;
+/// The margin of the whereabouts doubles each time that they had to be moved, up to so many slacks.
+constexpr double kWidestMargin = 8;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -35,6 +37,7 @@ void PairList::moved(const Points& x, std::vector<double>& distance) const {
 
 void NearPairs::begin() {
   boxes_.clear();
+  margin_ = slack_;
   near_.made_at.resize(0, 3);
 }
 
@@ -50,11 +53,12 @@ bool NearPairs::contains(const Points& x) const {
 
 bool NearPairs::cover(const Points& from, const Points& to) {
   if (contains(from) && contains(to)) return false;
+  if (!boxes_.empty()) margin_ = std::min(2 * margin_, kWidestMargin * slack_);
   boxes_.resize(at(from.count()));
   parallel_for(boxes_.size(), [&](std::size_t v) {
     const Vec3 a = from(static_cast<int>(v)), b = to(static_cast<int>(v));
-    boxes_[v].low = a.cwiseMin(b).array() - slack_;
-    boxes_[v].high = a.cwiseMax(b).array() + slack_;
+    boxes_[v].low = a.cwiseMin(b).array() - margin_;
+    boxes_[v].high = a.cwiseMax(b).array() + margin_;
   });
   list_candidates(from);
   near_.made_at.resize(0, 3);

@@ -87,6 +87,7 @@ class NearPairs {
 
   collision::BroadPhase broad_phase_;
   double reach_, slack_;
+  double margin_ = 0;  ///< by which the whereabouts are wider than what they were asked to cover, m
   int generation_ = 0;
   std::vector<collision::VertexBox> boxes_;  ///< empty: no whereabouts yet
   PairList candidates_, near_;

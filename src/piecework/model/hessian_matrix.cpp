@@ -104,6 +104,27 @@ void HessianMatrix::assemble(const Positions& x, const StepProblem& problem,
     bend_[i] = bend_softening(c, x, form);
   });
   parallel_for(blocks_.size(), [&](std::size_t k) { blocks_[k] = gathered(k); });
+  rounded_.clear();
+}
+
+void HessianMatrix::multiply_rounded(const Positions& x, Positions& y) {
+  if (rounded_.empty()) {
+    rounded_.resize(blocks_.size());
+    parallel_for(blocks_.size(), [&](std::size_t k) { rounded_[k] = blocks_[k].cast<float>(); });
+  }
+  y.resize(count(), 3);
+  const int* begin = system_.outerIndexPtr();
+  const int* row = system_.innerIndexPtr();
+  parallel_for(static_cast<std::size_t>(count()), [&](std::size_t column) {
+    double sum[3] = {0, 0, 0};
+    for (int k = begin[column]; k < begin[column + 1]; ++k) {
+      const float* b = rounded_[static_cast<std::size_t>(k)].data();  // column-major: its transpose
+      const double* v = x.data() + 3 * static_cast<std::ptrdiff_t>(row[k]);
+      for (int i = 0; i < 3; ++i)
+        sum[i] += double(b[3 * i]) * v[0] + double(b[3 * i + 1]) * v[1] + double(b[3 * i + 2]) * v[2];
+    }
+    for (int i = 0; i < 3; ++i) y(static_cast<Eigen::Index>(column), i) = sum[i];
+  });
 }
 
 void HessianMatrix::multiply(const Positions& x, Positions& y) const {

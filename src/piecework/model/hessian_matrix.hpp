@@ -39,6 +39,9 @@ class HessianMatrix {
   /// y = H x; both n_f x 3.
   void multiply(const Positions& x, Positions& y) const;
 
+  /// The same with blocks rounded to 32 bits: half the memory to read.
+  void multiply_rounded(const Positions& x, Positions& y);
+
   /// The blocks as 3 n_f x 3 n_f scalars, lower triangle: row 3 i + c is coordinate c of unknown i.
   /// The reference is valid until the next call; its pattern stays as it is until set_pattern().
   const SparseMatrix& scalars();
@@ -73,6 +76,7 @@ class HessianMatrix {
   std::vector<StretchSoftening> stretch_;  ///< per triangle
   std::vector<Mat3> bend_;                        ///< per curved hinge
   std::vector<Mat3> blocks_;
+  std::vector<Eigen::Matrix3f> rounded_;  ///< of blocks_; empty: not rounded yet
   SparseMatrix scalars_;
 };
 

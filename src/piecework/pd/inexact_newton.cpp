@@ -60,7 +60,7 @@ void InexactNewton::add_contact(const Positions& d, Positions& product) {
 }
 
 void InexactNewton::multiply(const Positions& d, Positions& product) {
-  hessian_.multiply(d, product);
+  hessian_.multiply_rounded(d, product);
   if (!blocks_.empty()) add_contact(d, product);
 }
 
