@@ -13,6 +13,8 @@ constexpr std::size_t kVerticesPerBlock = 2048;
 constexpr double kApproach = 0.9;
 /// Of the contact distance: nearer than this counts as touching when a way is followed.
 constexpr double kTouching = 1e-3;
+/// Of the contact distance: where a vertex is put that would otherwise be inside.
+constexpr double kBeside = 0.5;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -53,6 +55,16 @@ double Bodies::free_part(int body, const Vec3& from, const Vec3& way,
   return kApproach * t;
 }
 
+/// Cutting a way short would also end its sliding: rather beside the body where it would be in it,
+/// if the way there is free.
+Vec3 Bodies::beside(int body, const Vec3& from, const Vec3& way, double part) const {
+  const auto there = colliders_[at(body)].signed_distance(from + way, end_[at(body)]);
+  const double missing = kBeside * distance(body) - there.distance;
+  const Vec3 pushed = way + missing * there.normal;
+  if (free_part(body, from, pushed, end_[at(body)]) == 1) return from + pushed;
+  return from + part * way;
+}
+
 void Bodies::start(const Positions& previous, const std::vector<char>& held, Positions& x) const {
   for (int body = 0; body < static_cast<int>(colliders_.size()); ++body) {
     const Eigen::Isometry3d carry = end_[at(body)] * begin_[at(body)].inverse();
@@ -63,7 +75,7 @@ void Bodies::start(const Positions& previous, const std::vector<char>& held, Pos
       const Vec3 from = carry * Vec3(previous.row(row).transpose());
       const Vec3 way = x.row(row).transpose() - from;
       const double part = free_part(body, from, way, end_[at(body)]);
-      if (part < 1) x.row(row) = (from + part * way).transpose();
+      if (part < 1) x.row(row) = beside(body, from, way, part).transpose();
     });
   }
 }

@@ -50,6 +50,7 @@ class Bodies {
 
  private:
   [[nodiscard]] double distance(int body) const;
+  [[nodiscard]] Vec3 beside(int body, const Vec3& from, const Vec3& way, double part) const;
   [[nodiscard]] double free_part(int body, const Vec3& from, const Vec3& way,
                                  const Eigen::Isometry3d& pose) const;
 
