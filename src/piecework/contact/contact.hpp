@@ -141,7 +141,7 @@ class Contact final : public model::ContactTerms {
   Positions way_, obstacle_way_;
   std::vector<double> scale_, next_scale_;
   std::vector<char> changed_;
-  std::vector<double> moved_;
+  std::vector<double> moved_, own_way_;
   double held_scale_ = 1, next_held_scale_ = 1;
   bool held_moves_ = false;
   std::vector<Hit> hits_;

@@ -4,11 +4,13 @@
 // step, and among them those that are near now.
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
 #include <piecework/collision/broad_phase.hpp>
 #include <piecework/collision/distance.hpp>
+#include <piecework/core/parallel.hpp>
 #include <piecework/core/types.hpp>
 
 namespace piecework::contact {
@@ -29,10 +31,19 @@ struct Points {
   [[nodiscard]] int count() const { return static_cast<int>(cloth.rows() + obstacles.rows()); }
 };
 
+/// A vector that starts as zero, for sums.
+struct Sum3 {
+  Vec3 value = Vec3::Zero();
+  Sum3& operator+=(const Sum3& other) {
+    value += other.value;
+    return *this;
+  }
+};
+
 struct NearPair {
   collision::PairVertices vertices;
   collision::PairKind kind;
-  double distance;  ///< where the list was made, m
+  double distance;  ///< where the list was made, or less, m
 };
 
 /// Pairs and where they were measured.
@@ -43,6 +54,25 @@ struct PairList {
   /// How far each vertex is from where the list was made, m.
   void moved(const Points& x, std::vector<double>& distance) const;
 };
+
+/// |b_v - a_v - u| of every vertex, u the mean motion of the cloth: what moves all of a pair alike
+/// does not bring it closer. \param a, b  point(vertex), m
+template <class A, class B>
+void own_motion(int count, int num_cloth, const A& a, const B& b, std::vector<double>& distance) {
+  const Vec3 mean = num_cloth == 0 ? Vec3(Vec3::Zero())
+                                   : Vec3(parallel_sum<Sum3>(static_cast<std::size_t>(num_cloth),
+                                                             [&](std::size_t v) {
+                                                               const int i = static_cast<int>(v);
+                                                               return Sum3{b(i) - a(i)};
+                                                             })
+                                              .value /
+                                          num_cloth);
+  distance.resize(static_cast<std::size_t>(count));
+  parallel_for(distance.size(), [&](std::size_t v) {
+    const int i = static_cast<int>(v);
+    distance[v] = std::sqrt((b(i) - a(i) - mean).squaredNorm());
+  });
+}
 
 /// By how much two elements may have come closer while their vertices moved by so much each.
 inline double closing_bound(collision::PairKind kind, double a, double b, double c, double d) {

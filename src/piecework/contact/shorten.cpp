@@ -24,8 +24,8 @@ double closing_on_way(collision::PairKind kind, const collision::PairPoints& a,
                       const collision::PairPoints& b) {
   const collision::PairPoints u{b[0] - a[0], b[1] - a[1], b[2] - a[2], b[3] - a[3]};
   const Vec3 mean = 0.25 * (u[0] + u[1] + u[2] + u[3]);
-  return closing_bound(kind, (u[0] - mean).norm(), (u[1] - mean).norm(), (u[2] - mean).norm(),
-                       (u[3] - mean).norm());
+  const auto own = [&](std::size_t i) { return std::sqrt((u[i] - mean).squaredNorm()); };
+  return closing_bound(kind, own(0), own(1), own(2), own(3));
 }
 
 }  // namespace
@@ -45,10 +45,12 @@ void Contact::find_hits(const PairList& list, const std::vector<double>& moved, 
           if (!first && !changed_[at(v[0])] && !changed_[at(v[1])] && !changed_[at(v[2])] &&
               !changed_[at(v[3])])
             continue;
+          const auto bound = [&](const std::vector<double>& by) {
+            return closing_bound(pair.kind, by[at(v[0])], by[at(v[1])], by[at(v[2])], by[at(v[3])]);
+          };
+          const double apart = pair.distance - bound(moved);
+          if (bound(own_way_) < apart) continue;
           const collision::PairPoints a = from(v), b = to(v);
-          const double apart =
-              pair.distance - closing_bound(pair.kind, moved[at(v[0])], moved[at(v[1])],
-                                            moved[at(v[2])], moved[at(v[3])]);
           if (closing_on_way(pair.kind, a, b) < apart) continue;
           const collision::CcdResult result =
               collision::first_contact(pair.kind, a, b, options_.ccd);
@@ -111,6 +113,7 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
   const bool short_way = near_.valid_at(from) && near_.valid_at(end);
   const PairList& list = short_way ? near_.near(from) : near_.candidates();
   list.moved(from, moved_);
+  own_motion(from.count(), model_.num_vertices(), from, end, own_way_);
   find_hits(list, moved_, from, end, true);
   held_scale_ = 1;
   if (!hits_.empty()) {
@@ -142,6 +145,7 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
     take_scales();
     go(from, to, obstacles);
     if (round >= kLocalRounds) break;
+    own_motion(from.count(), model_.num_vertices(), from, end, own_way_);
     find_hits(list, moved_, from, end, false);
   }
   report_.narrow_ms += watch.lap();

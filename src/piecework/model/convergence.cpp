@@ -37,6 +37,13 @@ double ErrorEstimate::value(double least) const {
   return factor * *std::max_element(recent, increments_.end());
 }
 
+double ErrorEstimate::newton_value() const {
+  if (increments_.size() < 2) return std::numeric_limits<double>::infinity();
+  const double last = increments_.back(), before = increments_[increments_.size() - 2];
+  const double q = before > 0 ? std::min(0.99, last / before) : 0.99;
+  return std::max(1.0, q / (1 - q)) * last;
+}
+
 double ErrorEstimate::cautious_value(double least) const {
   ErrorEstimate later;
   for (std::size_t i = 1; i < increments_.size(); ++i) later.add(increments_[i]);
@@ -68,7 +75,7 @@ void Convergence::measure_increment(std::size_t count, const RowSquare& row_sq,
                                     StepReport& report) {
   measure_length(count, row_sq, report);
   error_.add(report.dx_inf);
-  const double left = newton_ ? report.dx_inf : error_.value(hidden_);
+  const double left = newton_ ? error_.newton_value() : error_.value(hidden_);
   report.error = left * unit_box_ / mean_edge_;
 }
 

@@ -28,6 +28,9 @@ class ErrorEstimate {
   /// The same, but the first increment of a step is no witness of decay: it undoes the strain of
   /// the prediction, which on stiff cloth makes it larger than all that follow by orders.
   [[nodiscard]] double cautious_value(double least) const;
+  /// Of increments of Newton's method: max(1, q / (1 - q)) |dx|, q the ratio of the last two. A
+  /// projected second derivative converges linearly where cloth is compressed.
+  [[nodiscard]] double newton_value() const;
   /// The error if the next increment would be `dx_inf`, but rounding does not let it be made.
   [[nodiscard]] double if_next(double dx_inf) const;
   /// q, at most 0.999; 1 before two increments are known.
@@ -92,6 +95,11 @@ class Convergence {
   /// Iterations until the stop rule holds, if they go on like the last ones; may be infinite.
   [[nodiscard]] double expected_iterations(const StepReport& report) const;
 
+  /// Increments that matter to the stop rule, m: those below are small. 0: it asks for something
+  /// else.
+  [[nodiscard]] double small_increment() const {
+    return stop_.rule == StopRule::Error ? stop_.tolerance * mean_edge_ : 0;
+  }
   [[nodiscard]] const StopOptions& stop() const { return stop_; }
   /// Largest extent of the start shape, m (1 if it is a point): lengths of dx_2, dx_rms and dx_inf.
   [[nodiscard]] double unit_box() const { return unit_box_; }

@@ -33,6 +33,7 @@ constexpr int kIterationsPerRefresh = 15;
 constexpr int kEasyIterations = 2;
 /// Newton's direction: by what factor more inner iterations than with a fresh metric pay for
 /// another one.
+constexpr double kSafety = 4;  // increments up to so many tolerances must be exact
 constexpr double kPcgGrowth = 1.5;
 constexpr int kPcgAllowance = 10;
 constexpr double kLongestWait = 16;  // steps between two attempts without normals
@@ -228,7 +229,7 @@ void DdPd::propose(const model::StepProblem& problem, model::StepReport& report)
   }
   if (!newton_) newton_ = std::make_unique<InexactNewton>(model_);
   newton_->assemble(now_.x, problem, metric_, contact_);
-  pcg_iterations_ = newton_->solve(now_.g, metric_, d_);
+  pcg_iterations_ = newton_->solve(now_.g, kSafety * convergence_.small_increment(), metric_, d_);
   if (pcg_after_refresh_ == 0) pcg_after_refresh_ = std::max(1, pcg_iterations_);
   report.pcg_iterations += pcg_iterations_;
   report.global_solves += pcg_iterations_ + 1;
@@ -246,8 +247,9 @@ void DdPd::accept(const Positions& moved, double scale, double step, model::Step
   if (!newton_proposed_) acceleration_->accept(scale, moved, now_.g, trial_.g);
   convergence_.assume_newton(newton_proposed_);
   convergence_.assume_stiffness_ratio(metric_.normals_in_use() ? 1.0 : stiffness_ratio_);
-  // What contact cut off is still to be done.
-  convergence_.measure_increment(sweeps_ ? moved : d_, sweeps_ ? scale : step, report);
+  // What contact or a barrier cut off is still to be done.
+  const double wanted = sweeps_ ? scale : newton_proposed_ ? 1.0 : step;
+  convergence_.measure_increment(sweeps_ ? moved : d_, wanted, report);
   std::swap(now_, trial_);
 }
 

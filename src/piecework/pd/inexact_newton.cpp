@@ -1,6 +1,7 @@
 #include <piecework/pd/inexact_newton.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 #include <piecework/core/parallel.hpp>
 #include <piecework/pd/acceleration.hpp>
@@ -10,6 +11,12 @@ namespace {
 
 /// The residual that is left of the linear system.
 constexpr double kLoosest = 0.5, kTightest = 0.1;
+
+double longest(const Positions& d) {
+  return std::sqrt(parallel_max(static_cast<std::size_t>(d.rows()), [&](std::size_t i) {
+    return d.row(static_cast<Eigen::Index>(i)).squaredNorm();
+  }));
+}
 
 /// a += factor b.
 void add(Positions& a, double factor, const Positions& b) {
@@ -73,16 +80,20 @@ double InexactNewton::forcing(double norm_sq) {
   return std::clamp(0.9 * ratio_sq, kTightest, kLoosest);
 }
 
-int InexactNewton::solve(const Positions& g, Metric& metric, Positions& d) {
+int InexactNewton::solve(const Positions& g, double small, Metric& metric, Positions& d) {
   d.setZero(g.rows(), 3);
   residual_ = -g;
   metric.apply(residual_, preconditioned_);
   direction_ = preconditioned_;
   double norm_sq = dot(residual_, preconditioned_);
-  const double eta = forcing(norm_sq);
-  const double enough = eta * eta * norm_sq;
+  const double tight = kTightest * kTightest * norm_sq;
+  double enough = std::pow(forcing(norm_sq), 2) * norm_sq;
   int iterations = 0;
-  while (iterations < kMaxIterations && norm_sq > enough) {
+  while (iterations < kMaxIterations && norm_sq > tight) {
+    if (norm_sq <= enough) {
+      if (longest(d) > small) break;
+      enough = tight;
+    }
     multiply(direction_, product_);
     const double curvature = dot(direction_, product_);
     if (!(curvature > 0)) break;  // only rounding is left

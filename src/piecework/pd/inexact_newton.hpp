@@ -34,7 +34,9 @@ class InexactNewton {
 
   /// d = -H^-1 g, as exactly as the progress since the last call deserves; n_f x 3. Returns the
   /// iterations, kMaxIterations at most. d leads down whatever they are, above 0.
-  int solve(const Positions& g, Metric& metric, Positions& d);
+  /// \param small  m: a d that is nowhere longer than this must be exact, or it would be taken for
+  ///               convergence
+  int solve(const Positions& g, double small, Metric& metric, Positions& d);
 
  private:
   static constexpr int kMaxIterations = 200;
