@@ -21,8 +21,8 @@ namespace {
 /// Largest coordinate, m: differences of any two, and their products with scales, stay finite.
 constexpr double kFarthest = 1e100;
 
-/// A tree is built anew when its boxes have grown so much against those of its elements since it
-/// was built (chosen: building costs about a fifth of a search, which slows down as boxes grow).
+/// Trees are built anew when their boxes have grown so much against those of their elements since
+/// they were built (chosen: building takes as long as about half a search).
 constexpr double kRebuildGrowth = 1.5;
 
 bool is_valid(const VertexBox& box) {
@@ -161,7 +161,12 @@ struct BroadPhase::Impl {
         rows(static_cast<std::size_t>(surface.num_vertices), kEmptyRow),
         vertices(vertex_groups(cloth, obstacle, surface.self),
                  static_cast<std::size_t>(surface.num_vertices)),
-        edges(edge_groups(cloth, obstacle, surface.self), surface.edges.size()) {}
+        edges(edge_groups(cloth, obstacle, surface.self), surface.edges.size()) {
+    // Of two edges the lower one looks for the other, and those of obstacles do not look.
+    PIECEWORK_ASSERT(std::is_partitioned(
+        surface.edges.begin(), surface.edges.end(),
+        [this](const std::array<int, 2>& edge) { return surface.is_cloth(edge[0]); }));
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   ~Impl() = default;
