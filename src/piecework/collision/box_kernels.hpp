@@ -41,8 +41,8 @@ struct BoxKernels {
   std::size_t (*edges_with_edges)(const LeafQuery& query, const Reach& reach, const Retest& retest,
                                   Hits& hits);
   /// Writes `count` different numbers in ascending order. Quadratic, meant for short lists.
-  /// \param list  room for kLanes more, which are overwritten
-  void (*sort)(int* list, int count, int* sorted);
+  /// \param list  kLanes more can be read
+  void (*sort)(const int* list, int count, int* sorted);
 };
 
 /// \pre this processor runs `isa`.

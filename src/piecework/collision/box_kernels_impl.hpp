@@ -136,15 +136,16 @@ struct BoxLoops {
     return compared * kLanes;
   }
 
-  /// A number's place is how many are not larger, itself left out.
-  static void sort(int* list, int count, int* sorted) {
-    for (int i = 0; i < kLanes; ++i) list[count + i] = LeafItems::kNoElement;
-    const int padded = (count + kLanes - 1) / kLanes * kLanes;
+  /// A number's place follows from how many are larger. Lanes beyond the list are masked, not
+  /// filled: reading what was just written in pieces would stall.
+  static void sort(const int* list, int count, int* sorted) {
     for (int i = 0; i < count; ++i) {
       int larger = 0;
-      for (int j = 0; j < padded; j += kLanes)
-        larger += __builtin_popcount(Lanes::greater(list + j, list[i]));
-      sorted[padded - 1 - larger] = list[i];
+      for (int j = 0; j < count; j += kLanes) {
+        const unsigned valid = count - j >= kLanes ? ~0U : (1U << (count - j)) - 1;
+        larger += __builtin_popcount(Lanes::greater(list + j, list[i]) & valid);
+      }
+      sorted[count - 1 - larger] = list[i];
     }
   }
 

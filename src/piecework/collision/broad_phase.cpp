@@ -21,8 +21,8 @@ namespace {
 /// Largest coordinate, m: differences of any two, and their products with scales, stay finite.
 constexpr double kFarthest = 1e100;
 
-/// A tree is built anew when its boxes have grown so much against those of its elements since it
-/// was built (chosen: building costs about a fifth of a search, which slows down as boxes grow).
+/// Trees are built anew when their boxes have grown so much against those of their elements since
+/// they were built (chosen: building takes as long as about half a search).
 constexpr double kRebuildGrowth = 1.5;
 
 bool is_valid(const VertexBox& box) {
@@ -46,11 +46,6 @@ void check(std::span<const VertexBox> boxes, double gap) {
 
 VertexBox united(const VertexBox& a, const VertexBox& b) {
   return {a.low.cwiseMin(b.low), a.high.cwiseMax(b.high)};
-}
-
-/// The definition of find().
-bool within_gap(const VertexBox& a, const VertexBox& b, double gap) {
-  return (a.low - b.high).maxCoeff() <= gap && (b.low - a.high).maxCoeff() <= gap;
 }
 
 VertexBox united(std::span<const VertexBox> boxes) {
@@ -166,7 +161,12 @@ struct BroadPhase::Impl {
         rows(static_cast<std::size_t>(surface.num_vertices), kEmptyRow),
         vertices(vertex_groups(cloth, obstacle, surface.self),
                  static_cast<std::size_t>(surface.num_vertices)),
-        edges(edge_groups(cloth, obstacle, surface.self), surface.edges.size()) {}
+        edges(edge_groups(cloth, obstacle, surface.self), surface.edges.size()) {
+    // Of two edges the lower one looks for the other, and those of obstacles do not look.
+    PIECEWORK_ASSERT(std::is_partitioned(
+        surface.edges.begin(), surface.edges.end(),
+        [this](const std::array<int, 2>& edge) { return surface.is_cloth(edge[0]); }));
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   ~Impl() = default;
@@ -176,14 +176,25 @@ struct BroadPhase::Impl {
       if (body->take_rows(boxes, frame, rows) || !body->built) report.rebuilt |= body->update(rows);
   }
 
+  /// The definition of find(), axis by axis.
   template <class A, class B>
   [[nodiscard]] bool near(const A& a, const B& b) const {
-    const auto box_of = [&](const auto& element) {
-      VertexBox box = boxes_now[static_cast<std::size_t>(element[0])];
-      for (const int v : element) box = united(box, boxes_now[static_cast<std::size_t>(v)]);
-      return box;
+    const auto range = [&](const auto& element, Eigen::Index axis) {
+      const VertexBox& first = boxes_now[static_cast<std::size_t>(element[0])];
+      double low = first.low[axis], high = first.high[axis];
+      for (std::size_t k = 1; k < element.size(); ++k) {
+        const VertexBox& box = boxes_now[static_cast<std::size_t>(element[k])];
+        low = std::min(low, box.low[axis]);
+        high = std::max(high, box.high[axis]);
+      }
+      return std::array{low, high};
     };
-    return within_gap(box_of(a), box_of(b), gap_now);
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      const auto [low_a, high_a] = range(a, axis);
+      const auto [low_b, high_b] = range(b, axis);
+      if (low_a - high_b > gap_now || low_b - high_a > gap_now) return false;
+    }
+    return true;
   }
   static bool vertex_near_triangle(const void* context, int v, int t) {
     const Impl& self = *static_cast<const Impl*>(context);

@@ -29,15 +29,18 @@ struct CandidatePairs {
 };
 
 struct BroadPhaseReport {
-  bool rebuilt = false;  ///< trees built anew, not refitted
+  bool rebuilt = false;  ///< trees of cloth or obstacles built anew, not refitted
   double build_ms = 0;   ///< refit included
   double query_ms = 0;
-  std::size_t box_tests = 0;  ///< of pairs of tree nodes and leaves
+  std::size_t box_tests = 0;  ///< pairs of boxes compared: of nodes, leaves and elements
 };
 
 /// Linear bounding volume hierarchies [Karras 2012] over the triangles and edges of a surface,
-/// refitted from call to call and rebuilt when they have become bad, by a rule on their boxes, not
-/// on clocks. Parallel; the same pairs in the same order for every number of threads.
+/// those of cloth apart from those of obstacles. Their boxes are refitted from call to call
+/// (obstacles at rest: not even that), and a body's trees are built anew when their boxes have
+/// become bad, by a rule on surface areas, not on clocks. Parallel; the same pairs in the same
+/// order for every number of threads and every instruction set. Buffers are kept: calls that find
+/// no more pairs than earlier ones and build no trees allocate nothing for them.
 class BroadPhase {
  public:
   explicit BroadPhase(Surface surface);
@@ -48,7 +51,11 @@ class BroadPhase {
   /// All pairs that may come within `gap` (m) of each other while every vertex stays in its box
   /// (num_vertices() of them): those whose elements' boxes, unions of their vertices' boxes, come
   /// within `gap` in each coordinate. Left out: pairs that share a vertex, pairs of obstacles, and
-  /// pairs of cloth unless Surface::self.
+  /// pairs of cloth unless Surface::self. Decided in double precision: "within" means
+  /// low_a - high_b <= gap and low_b - high_a <= gap as doubles. The result lives until the next
+  /// call. \throws SimulationError that names the vertex if a box is empty (low > high), not finite
+  /// or
+  ///         beyond 1e100 m, or if the gap is negative or not finite; earlier pairs are kept then
   const CandidatePairs& find(std::span<const VertexBox> boxes, double gap);
 
   /// Of the last find().

@@ -9,8 +9,8 @@
 
 namespace piecework::collision {
 
-/// Cloth first, then obstacles: bodies whose motion is prescribed. Obstacles never collide with
-/// each other. Elements that share a vertex never collide.
+/// In every list cloth first, then obstacles: bodies whose motion is prescribed. Obstacles never
+/// collide with each other. Elements that share a vertex never collide.
 struct Surface {
   int num_vertices = 0;                   ///< of cloth and obstacles
   int num_cloth_vertices = 0;             ///< vertices below this are cloth
