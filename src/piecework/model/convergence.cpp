@@ -38,10 +38,11 @@ double ErrorEstimate::value(double least) const {
 }
 
 double ErrorEstimate::newton_value() const {
+  constexpr double kSudden = 0.25;
   if (increments_.size() < 2) return std::numeric_limits<double>::infinity();
   const double last = increments_.back(), before = increments_[increments_.size() - 2];
   const double q = before > 0 ? std::min(0.99, last / before) : 0.99;
-  return std::max(1.0, q / (1 - q)) * last;
+  return std::max(last, kSudden * before) * std::max(1.0, q / (1 - q));
 }
 
 double ErrorEstimate::cautious_value(double least) const {

@@ -29,7 +29,9 @@ class ErrorEstimate {
   /// the prediction, which on stiff cloth makes it larger than all that follow by orders.
   [[nodiscard]] double cautious_value(double least) const;
   /// Of increments of Newton's method: max(1, q / (1 - q)) |dx|, q the ratio of the last two. A
-  /// projected second derivative converges linearly where cloth is compressed.
+  /// projected second derivative converges linearly where cloth is compressed. And a linear system
+  /// that is solved inexactly is solved for its stiffest part first: an increment that is suddenly
+  /// small does not count as less than a quarter of the one before.
   [[nodiscard]] double newton_value() const;
   /// The error if the next increment would be `dx_inf`, but rounding does not let it be made.
   [[nodiscard]] double if_next(double dx_inf) const;
