@@ -51,6 +51,16 @@ bool is_plausible(const Header& header, std::size_t file_size) {
          (header.previous == 0 || header.previous == header.vertices);
 }
 
+/// Meshes at the start: where solids are and how all move is in the scene.
+void add_colliders(const World& world, Hash& hash) {
+  Positions x;
+  for (const colliders::MeshCollider& collider : world.mesh_colliders) {
+    collider.positions_at(0, x);
+    hash.add(std::span(x.data(), static_cast<std::size_t>(x.size())));
+    hash.add(std::span(collider.triangles()));
+  }
+}
+
 }  // namespace
 
 std::string scene_hash(const scene::Scene& scene) {
@@ -69,6 +79,12 @@ std::string scene_hash(const scene::Scene& scene) {
     cloth.rest_file = fs::path(cloth.rest_file).filename().string();
   }
   for (scene::Seam& seam : motion.seams) seam.file = fs::path(seam.file).filename().string();
+  const auto drop_folder = [](std::string& file) { file = fs::path(file).filename().string(); };
+  for (scene::Collider& collider : motion.colliders) {
+    if (collider.mesh) drop_folder(collider.mesh->file);
+    if (collider.sequence) drop_folder(collider.sequence->pattern);
+    if (collider.avatar) drop_folder(collider.avatar->file);
+  }
   return Hash().add(scene::resolved_json(motion)).hex();
 }
 
@@ -89,6 +105,7 @@ std::string motion_hash(const World& world) {
     hash.add(std::span(seams.slaves)).add(std::span(seams.begin)).add(std::span(seams.carrier));
     hash.add(std::span(seams.weight)).add(std::span(seams.close_time));
   }
+  add_colliders(world, hash);
   return hash.hex();
 }
 

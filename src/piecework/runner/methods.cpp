@@ -162,9 +162,8 @@ std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
 
 std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
   const scene::Scene& scene = world.scene;
-  static std::vector<colliders::AnalyticCollider> bodies;
-  if (getenv("PW_SPHERE") && bodies.empty()) bodies.emplace_back(colliders::Traits{"ball",{},{}}, colliders::Sphere{Vec3::Zero(),0.3}, Eigen::Isometry3d::Identity(), colliders::RigidMotion{});
-  if (!scene.self_collision && bodies.empty()) return nullptr;
+  if (!scene.self_collision && world.analytic_colliders.empty() && world.mesh_colliders.empty())
+    return nullptr;
   contact::ContactOptions options;
   options.h = scene.step.h;
   options.self = scene.self_collision;
@@ -177,7 +176,9 @@ std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
   options.ccd.method =
       scene.quality.ccd == "newton" ? collision::CcdMethod::Newton : collision::CcdMethod::Halley;
   options.check = scene.contact.check;
-  return std::make_unique<contact::Contact>(world.model, options, contact::Colliders{bodies,{}});
+  return std::make_unique<contact::Contact>(world.model, options,
+                                            contact::Colliders{world.analytic_colliders,
+                                                               world.mesh_colliders});
 }
 
 std::unique_ptr<model::Integrator> make_integrator(const World& world) {

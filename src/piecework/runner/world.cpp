@@ -1,8 +1,6 @@
 #include <piecework/runner/world.hpp>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,12 +10,12 @@
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/generate.hpp>
 #include <piecework/mesh/import.hpp>
+#include <piecework/runner/bodies.hpp>
+#include <piecework/runner/scene_values.hpp>
 #include <piecework/runner/sewing.hpp>
 
 namespace piecework::runner {
 namespace {
-
-Vec3 vec(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
 /// The enumerator with this name; the scene module has already refused unknown names.
 template <class Enum, std::size_t N>
@@ -30,9 +28,7 @@ Enum named(const std::string& name, const Enum (&values)[N]) {
 mesh::ImportOptions import_options(const scene::Mesh& mesh) {
   mesh::ImportOptions options;
   options.unit_in_metres = mesh.units;
-  options.up_axis = mesh.up_axis == "x"   ? mesh::UpAxis::X
-                    : mesh.up_axis == "z" ? mesh::UpAxis::Z
-                                          : mesh::UpAxis::Y;
+  options.up_axis = up_axis(mesh.up_axis);
   options.repair = mesh.repair;
   options.weld = mesh.weld;
   return options;
@@ -40,16 +36,12 @@ mesh::ImportOptions import_options(const scene::Mesh& mesh) {
 
 /// Start shape: scaled, turned about x, then y, then z, moved.
 Positions place(const Positions& positions, const scene::Cloth& cloth) {
-  const auto radians = [](double degrees) { return degrees * std::numbers::pi / 180.0; };
-  const Mat3 turn = (Eigen::AngleAxisd(radians(cloth.rotate[2]), Vec3::UnitZ()) *
-                     Eigen::AngleAxisd(radians(cloth.rotate[1]), Vec3::UnitY()) *
-                     Eigen::AngleAxisd(radians(cloth.rotate[0]), Vec3::UnitX()))
-                        .toRotationMatrix();
   Positions placed = positions;
   if (cloth.scale != std::array<double, 3>{1, 1, 1})
     placed = placed * vec(cloth.scale).asDiagonal();
   // Untouched coordinates keep their bits.
-  if (cloth.rotate != std::array<double, 3>{0, 0, 0}) placed = placed * turn.transpose();
+  if (cloth.rotate != std::array<double, 3>{0, 0, 0})
+    placed = placed * rotation(cloth.rotate).transpose();
   placed.rowwise() += vec(cloth.translate).transpose();
   return placed;
 }
@@ -205,6 +197,7 @@ mesh::MeshDocument load_mesh(const scene::Mesh& mesh) {
   mesh::GeneratorOptions options;
   options.width = mesh.width;
   options.height = mesh.height;
+  options.depth = mesh.depth;
   options.columns = mesh.columns;
   options.rows = mesh.rows;
   options.radius = mesh.radius;
@@ -213,7 +206,9 @@ mesh::MeshDocument load_mesh(const scene::Mesh& mesh) {
   options.seed = static_cast<std::uint64_t>(mesh.seed);
   options.patches_x = mesh.patches_x;
   options.patches_y = mesh.patches_y;
-  return mesh::generate(named(mesh.generator, {Sheet, Strip, Tube, Disc, Quilt}), options);
+  return mesh::generate(
+      named(mesh.generator, {Sheet, Strip, Tube, Disc, Quilt, Icosphere, Box, Stairs, Funnel, Pot}),
+      options);
 }
 
 std::unique_ptr<World> build_world(const scene::Scene& scene) {
@@ -230,6 +225,7 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     add_pins_and_loads(*world, i, fmt::format("{}: /cloths/{}", scene.source, i));
   hold_seams(*world);
+  add_colliders(*world);
   world->load_ms = watch.lap();
 
   world->domains = decomposition::decompose(

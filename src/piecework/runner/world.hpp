@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <piecework/colliders/collider.hpp>
 #include <piecework/decomposition/decomposition.hpp>
 #include <piecework/mesh/triangle_mesh.hpp>
 #include <piecework/model/constraints.hpp>
@@ -24,10 +25,12 @@ struct World {
   std::vector<model::Pin> pins;                    ///< of sewn vertices: on what carries them
   std::vector<std::array<int, 2>> seam_neighbors;  ///< triangles that face each other across seams
   model::ExternalForces forces;
-  std::vector<Vec3> part_velocity;  ///< m/s, per cloth
+  std::vector<Vec3> part_velocity;                              ///< m/s, per cloth
+  std::vector<colliders::AnalyticCollider> analytic_colliders;  ///< in the order of the scene
+  std::vector<colliders::MeshCollider> mesh_colliders;          ///< in the order of the scene
   decomposition::Decomposition domains;
   decomposition::Summary domain_summary;
-  std::vector<std::string> notes;  ///< repairs, reduced domain counts
+  std::vector<std::string> notes;  ///< repairs, colliders, reduced domain counts
   double load_ms = 0;              ///< meshes and constraints
   double partition_ms = 0;         ///< domains
 

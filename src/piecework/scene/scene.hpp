@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include <piecework/core/types.hpp>
+#include <piecework/scene/bodies.hpp>
 
 namespace piecework::scene {
 
@@ -77,23 +77,6 @@ struct Load {
   std::optional<double> stop;            ///< s
 
   bool operator==(const Load&) const = default;
-};
-
-struct Mesh {
-  std::string generator;  ///< "sheet", "strip", "tube", "disc", "quilt"; or empty and `file`
-  std::string file;       ///< relative to the scene's folder
-  double width = 1, height = 1, radius = 0.5;  ///< m
-  int columns = 50, rows = 50;
-  std::string pattern = "alternating";
-  double jitter = 0.3;
-  int seed = 1;
-  int patches_x = 2, patches_y = 2;
-  double units = 1;  ///< metres per unit of the file
-  std::string up_axis = "y";
-  bool repair = false;
-  bool weld = true;
-
-  bool operator==(const Mesh&) const = default;
 };
 
 struct Cloth {
@@ -219,6 +202,7 @@ struct Scene {
   std::map<std::string, Material> materials;
   std::vector<Cloth> cloths;
   std::vector<Seam> seams;
+  std::vector<Collider> colliders;
   Camera camera;
   Render render;
   std::vector<Expectation> expect;

@@ -158,10 +158,12 @@ TEST(SceneErrors, Keys) {
           {with(R"(@"humidity": 0.4)"),
            "/humidity: unknown key \"humidity\"; known keys here: name, description, step, "
            "gravity, "
-           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, camera, render, expect"},
+           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, colliders, "
+           "camera, render, expect"},
           {with(R"(@"a/b~c": 0.4)"),
            "/a~1b~0c: unknown key \"a/b~c\"; known keys here: name, description, step, gravity, "
-           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, camera, render, expect"},
+           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, colliders, "
+           "camera, render, expect"},
           {R"(@{ "cloths": [] })",
            "/: \"materials\" is missing; add it: materials by name; cloths share them"},
           {with_cloth(R"(@{ "mesh": { "generator": "sheet" } })"),
@@ -196,6 +198,51 @@ TEST(SceneErrors, Keys) {
           {with(R"("expect": [ { "quantity": "center_y", "max": 1, "vertex": @3 } ])"),
            "/expect/0/vertex: \"vertex\" has no effect here, it belongs to a vertex_* quantity; "
            "remove it"}})
+    expect_fault(fault);
+}
+
+TEST(SceneErrors, Colliders) {
+  const auto in = [](const std::string& collider) {
+    return with("\"colliders\": [ " + collider + " ]");
+  };
+  for (
+      const Fault& fault : std::vector<Fault>{
+          {in(R"(@{ "radius": 1 })"),
+           "/colliders/0: \"shape\" is missing; add it: kind of body; all but mesh are exact "
+           "solids"},
+          {in(R"({ "shape": "plane", "radius": @1 })"),
+           "/colliders/0/radius: \"radius\" has no effect here, it belongs to shape sphere, "
+           "capsule, cylinder; remove it"},
+          {in(R"({ "shape": "box", "scale": @[1, 2, 3] })"),
+           "/colliders/0/scale: \"scale\" has no effect here, it belongs to shape mesh; remove it"},
+          {in(R"({ "shape": "box", "mesh": @{ "generator": "pot" } })"),
+           "/colliders/0/mesh: \"mesh\" has no effect here, it belongs to shape mesh; remove it"},
+          {in(R"(@{ "shape": "mesh" })"),
+           "/colliders/0: 0 of \"mesh\", \"sequence\" and \"avatar\" are given; give one of them"},
+          {in(R"(@{ "shape": "mesh", "mesh": { "file": "a.obj" }, "avatar": { "file": "b.glb" } })"),
+           "/colliders/0: 2 of \"mesh\", \"sequence\" and \"avatar\" are given; give one of them"},
+          {in(R"({ "shape": "mesh", "avatar": @{} })"),
+           "/colliders/0/avatar: \"file\" is missing; add it: glTF, GLB or FBX file; a relative "
+           "name starts at the folder of the scene"},
+          {in(R"({ "shape": "mesh", "sequence": { "pattern": "a{}", "first": 3, "last": @2 } })"),
+           "/colliders/0/sequence/last: last (2) is below first (3); exchange or correct them"},
+          {in(R"({ "shape": "plane", "normal": @[0, 0, 0] })"),
+           "/colliders/0/normal: the normal has no direction; write one, such as [0, 1, 0]"},
+          {in(R"(@{ "shape": "half_spaces" })"),
+           "/colliders/0: \"half_spaces\" without \"planes\"; list at least one"},
+          {in(R"({ "shape": "cylinder", "to": @[0, 0, 0] })"),
+           "/colliders/0/to: \"from\" and \"to\" are the same point; move one of them"},
+          {in(R"({ "shape": "sphere", "motion": { "rate": 1, "axis": @[0, 0, 0] } })"),
+           "/colliders/0/motion/axis: the axis of rotation has no direction; write one, such as "
+           "[0, 1, 0]"},
+          {in(R"({ "shape": "sphere", "motion": { "start": 2, "stop": @1 } })"),
+           "/colliders/0/motion/stop: stop (1) is below start (2); exchange or correct them"},
+          {in(R"({ "shape": "sphere", "friction": @-1 })"),
+           "/colliders/0/friction: -1 is out of range; choose a value of at least 0 and at most "
+           "10"},
+          {in(R"({ "shape": "sphere" }, @{ "shape": "plane" })"),
+           "/colliders/1/name: a second collider named \"collider\"; give each collider its own "
+           "\"name\""}})
     expect_fault(fault);
 }
 

@@ -19,83 +19,11 @@
 //
 // Whether a key `applies` may depend on members declared before it.
 
-#include <initializer_list>
-#include <limits>
-#include <string>
-#include <string_view>
-#include <vector>
-
+#include <piecework/scene/body_fields.hpp>
 #include <piecework/scene/scene.hpp>
+#include <piecework/scene/scene_keys.hpp>
 
 namespace piecework::scene {
-
-struct Key {
-  const char* name;
-  const char* doc;
-  const char* unit = "";
-  bool required = false;
-  /// False: giving the key is an error, since other keys make it meaningless.
-  bool applies = true;
-  const char* condition = "";  ///< when it applies, in words
-  bool on_by_default = false;  ///< an optional that only null switches off
-  const char* since = "0.1";   ///< version of Piecework that knows the key first
-
-  [[nodiscard]] Key needed() const {
-    Key key = *this;
-    key.required = true;
-    return key;
-  }
-  [[nodiscard]] Key on() const {
-    Key key = *this;
-    key.on_by_default = true;
-    return key;
-  }
-  [[nodiscard]] Key only(bool now, const char* when) const {
-    Key key = *this;
-    key.applies = now;
-    key.condition = when;
-    return key;
-  }
-};
-
-/// Limits of a number, or of each number of a list; of the length of a text or list.
-struct Range {
-  double min = -std::numeric_limits<double>::infinity();
-  double max = std::numeric_limits<double>::infinity();
-  bool above = false;      ///< min itself is outside
-  bool not_empty = false;  ///< texts and lists
-};
-
-constexpr Range between(double min, double max) { return {min, max, false, false}; }
-constexpr Range above(double min, double max) { return {min, max, true, false}; }
-constexpr Range not_empty() {
-  Range range;
-  range.not_empty = true;
-  return range;
-}
-constexpr Range indices() { return {0, std::numeric_limits<int>::max(), false, true}; }
-
-/// Sane limits, chosen so that squares and products stay finite.
-inline constexpr Range kLengths{-1e6, 1e6, false, false};  // m
-inline constexpr Range kTimes{0, 1e9, false, false};       // s
-
-struct Choice {
-  std::string name;
-  std::string doc;
-};
-using Choices = std::vector<Choice>;
-
-/// A named set of defaults for one struct; members that a row leaves out keep their own.
-template <class T>
-struct Preset {
-  const char* name;
-  const char* doc;
-  T values;
-};
-template <class T>
-using Presets = std::vector<Preset<T>>;
-
-using Names = std::initializer_list<const char*>;
 
 template <class V>
 void fields(V& v, Step& s) {
@@ -193,79 +121,6 @@ void fields(V& v, Load& l) {
       l.force, between(-1e9, 1e9));
   v.value({"start", "time at which it begins", "s"}, l.start, kTimes);
   v.value({"stop", "time at which it ends; absent: never", "s"}, l.stop, kTimes);
-}
-
-inline const Choices& generators() {
-  static const Choices choices = {{"sheet",
-                                   "width x height in the xz plane, columns x rows vertices, "
-                                   "first vertex at the origin, x "
-                                   "fastest; sets corners, left (x = 0), right, bottom (z = 0), "
-                                   "top, border"},
-                                  {"strip", "a sheet meant to be long; the same keys and sets"},
-                                  {"tube",
-                                   "open cylinder around y: radius, height, columns around, rows "
-                                   "along; sets bottom, "
-                                   "top, border"},
-                                  {"disc",
-                                   "flat disc in the xz plane: radius, rows rings, columns around "
-                                   "the rim; sets border, "
-                                   "center"},
-                                  {"quilt",
-                                   "patches_x x patches_y sheets in width x height, each meshed "
-                                   "in its own way, one "
-                                   "group per patch"}};
-  return choices;
-}
-
-template <class V>
-void fields(V& v, Mesh& m) {
-  v.about("Mesh", "Triangles, made by a generator or read from a file: one of the two.");
-  v.choice({"generator", "shape to make"}, m.generator, generators());
-  v.value({"file",
-           "mesh file (OBJ, PLY, STL, glTF); a relative name starts at "
-           "the folder of the scene"},
-          m.file, not_empty());
-  v.exactly_one({"generator", "file"});
-  const bool made = m.file.empty(), read = m.generator.empty();
-  const char* if_made = "generator";
-  const char* if_read = "file";
-  v.value(Key{"width", "extent along x (sheet, strip, quilt)", "m"}.only(made, if_made), m.width,
-          above(0, 1e6));
-  v.value(
-      Key{"height", "extent along z (sheet, strip, quilt) or y (tube)", "m"}.only(made, if_made),
-      m.height, above(0, 1e6));
-  v.value(Key{"radius", "radius (tube, disc)", "m"}.only(made, if_made), m.radius, above(0, 1e6));
-  v.value(Key{"columns", "vertices along the width, or around (tube, disc)"}.only(made, if_made),
-          m.columns, between(2, 1e6));
-  v.value(Key{"rows", "vertices along the height; rings (disc)"}.only(made, if_made), m.rows,
-          between(2, 1e6));
-  v.choice(Key{"pattern", "triangulation (sheet, strip)"}.only(made, if_made), m.pattern,
-           {{"alternating", "diagonals alternate from cell to cell"},
-            {"one_diagonal", "all diagonals one way: stiffness depends on direction"},
-            {"delaunay",
-             "jittered grid, edges flipped until Delaunay: no "
-             "preferred direction"}});
-  v.value(Key{"jitter", "how far inner vertices of the delaunay pattern move, in cells"}.only(
-              made, if_made),
-          m.jitter, between(0, 0.45));
-  v.value(Key{"seed", "seed of the jitter"}.only(made, if_made), m.seed,
-          between(0, std::numeric_limits<int>::max()));
-  v.value(Key{"patches_x", "patches along the width (quilt)"}.only(made, if_made), m.patches_x,
-          between(1, 1000));
-  v.value(Key{"patches_y", "patches along the height (quilt)"}.only(made, if_made), m.patches_y,
-          between(1, 1000));
-  v.value(Key{"units", "what one unit of the file measures", "m"}.only(read, if_read), m.units,
-          above(0, 1e6));
-  v.choice(Key{"up_axis", "axis that points up in the file; it becomes y"}.only(read, if_read),
-           m.up_axis, {{"x", "x is up"}, {"y", "y is up"}, {"z", "z is up"}});
-  v.value(Key{"repair",
-              "mend what can be mended safely (zero-area and duplicate "
-              "triangles, isolated vertices, "
-              "orientation), with a note; false: such a mesh is an error"}
-              .only(read, if_read),
-          m.repair);
-  v.value(Key{"weld", "merge vertices of one group at the same position"}.only(read, if_read),
-          m.weld);
 }
 
 template <class V>
@@ -613,6 +468,7 @@ void fields(V& v, Scene& s) {
   v.map(Key{"materials", "materials by name; cloths share them"}.needed(), s.materials);
   v.list(Key{"cloths", "pieces of cloth, at least one"}.needed(), s.cloths);
   v.list({"seams", "what is sewn together"}, s.seams);
+  v.list({"colliders", "bodies that the cloths collide with"}, s.colliders);
   v.object({"camera", "point of view"}, s.camera);
   v.object({"render", "what the pictures show"}, s.render);
   v.list({"expect",

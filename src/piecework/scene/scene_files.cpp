@@ -77,6 +77,11 @@ Scene with_resolved_files(Scene scene, const fs::path& file) {
     resolve(cloth.rest_file, folder);
   }
   for (Seam& seam : scene.seams) resolve(seam.file, folder);
+  for (Collider& collider : scene.colliders) {
+    if (collider.mesh) resolve(collider.mesh->file, folder);
+    if (collider.sequence) resolve(collider.sequence->pattern, folder);
+    if (collider.avatar) resolve(collider.avatar->file, folder);
+  }
   return scene;
 }
 

@@ -61,6 +61,23 @@ constexpr const char* kEveryKey = R"({
     { "cloth": "two", "to": "one", "set": "left", "to_set": "right", "reversed": true },
     { "cloth": "two", "file": "two.seams.json" },
     { "cloth": "two", "distance": 0.01 } ],
+  "colliders": [
+    { "name": "floor", "shape": "plane", "point": [0, 1, 0], "normal": [1, 1, 0] },
+    { "name": "post", "shape": "cylinder", "from": [1, 0, 0], "to": [1, 2, 0], "radius": 0.25,
+      "rounding": 0.125, "friction": 0.5, "thickness": 0.002 },
+    { "name": "crate", "shape": "box", "center": [1, 2, 3], "size": [3, 2, 1],
+      "motion": { "velocity": [1, 0, 0], "axis": [0, 0, 1], "center": [0, 5, 0], "rate": 2,
+                  "start": 1, "stop": 3 } },
+    { "name": "wedge", "shape": "half_spaces",
+      "planes": [ { "point": [1, 0, 0], "normal": [1, 1, 0] }, { "normal": [0, 0, 1] } ] },
+    { "name": "rock", "shape": "mesh", "mesh": { "generator": "stairs", "depth": 3 },
+      "translate": [1, 2, 3], "rotate": [0, 45, 0], "scale": [1, 2, 3] },
+    { "name": "jelly", "shape": "mesh",
+      "sequence": { "pattern": "j_{}.obj", "first": 2, "last": 9, "fps": 25, "start": 0.5,
+                    "units": 0.01, "up_axis": "z" } },
+    { "name": "figure", "shape": "mesh",
+      "avatar": { "file": "a.glb", "clip": "walk", "start_time": 1, "lead_in": 2,
+                  "lead": "first_pose", "units": 0.01, "up_axis": "x" } } ],
   "camera": { "position": [1, 2, 3], "target": [0, 1, 0], "fov": 40, "azimuth": 10, "elevation": 5,
               "ground": -1 },
   "render": { "color": "strain", "size": [320, 200], "borders": false, "mesh_lines": true },
@@ -114,6 +131,25 @@ std::vector<Seam> expected_seams() {
   return seams;
 }
 
+std::vector<Collider> expected_colliders() {
+  std::vector<Collider> c(7);
+  c[0].name = "floor", c[0].shape = "plane", c[0].point = {0, 1, 0}, c[0].normal = {1, 1, 0};
+  c[1].name = "post", c[1].shape = "cylinder", c[1].from = {1, 0, 0}, c[1].to = {1, 2, 0};
+  c[1].radius = 0.25, c[1].rounding = 0.125, c[1].friction = 0.5, c[1].thickness = 0.002;
+  c[2].name = "crate", c[2].shape = "box", c[2].center = {1, 2, 3}, c[2].size = {3, 2, 1};
+  c[2].motion = Motion{{1, 0, 0}, {0, 0, 1}, {0, 5, 0}, 2, 1, 3};
+  c[3].name = "wedge", c[3].shape = "half_spaces";
+  c[3].planes = {{{1, 0, 0}, {1, 1, 0}}, {{0, 0, 0}, {0, 0, 1}}};
+  c[4].name = "rock", c[4].shape = "mesh", c[4].mesh.emplace();
+  c[4].mesh->generator = "stairs", c[4].mesh->depth = 3;
+  c[4].translate = {1, 2, 3}, c[4].rotate = {0, 45, 0}, c[4].scale = {1, 2, 3};
+  c[5].name = "jelly", c[5].shape = "mesh";
+  c[5].sequence = Sequence{"j_{}.obj", 2, 9, 25, 0.5, 0.01, "z"};
+  c[6].name = "figure", c[6].shape = "mesh";
+  c[6].avatar = Avatar{"a.glb", "walk", 1, 2, "first_pose", 0.01, "x"};
+  return c;
+}
+
 Scene expected_every_key() {
   Scene scene;
   scene.name = "all", scene.description = "every key\nof a scene", scene.source = "x/s.json";
@@ -129,6 +165,7 @@ Scene expected_every_key() {
   scene.contact = {0.002, 100, "ipc", 0.01, false};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();
+  scene.colliders = expected_colliders();
   scene.cloths = {expected_first_cloth(), expected_second_cloth()};
   scene.camera = {Vector{1, 2, 3}, Vector{0, 1, 0}, 40, 10, 5, -1};
   scene.render = {"strain", {320, 200}, false, true};

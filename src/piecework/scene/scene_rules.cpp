@@ -121,6 +121,47 @@ void check_seam(const Seam& seam, const Scene& scene, const Part& part) {
   check_stitches(seam, part.in("stitches"));
 }
 
+void check_motion(const Motion& motion, const Part& part) {
+  check_order(part.in("stop"), motion.start, motion.stop, "start", "stop");
+  part.in("axis").require(motion.rate == 0 || motion.axis != std::array<double, 3>{0, 0, 0},
+                          "the axis of rotation has no direction", "write one, such as [0, 1, 0]");
+}
+
+void check_normal(const std::array<double, 3>& normal, const Part& part) {
+  part.in("normal").require(normal != std::array<double, 3>{0, 0, 0}, "the normal has no direction",
+                            "write one, such as [0, 1, 0]");
+}
+
+void check_collider(const Collider& collider, const Part& part) {
+  const int sources = int{collider.mesh.has_value()} + int{collider.sequence.has_value()} +
+                      int{collider.avatar.has_value()};
+  part.require(collider.shape != "mesh" || sources == 1,
+               fmt::format("{} of \"mesh\", \"sequence\" and \"avatar\" are given", sources),
+               "give one of them");
+  check_normal(collider.normal, part);
+  part.require(collider.shape != "half_spaces" || !collider.planes.empty(),
+               "\"half_spaces\" without \"planes\"", "list at least one");
+  for (std::size_t i = 0; i < collider.planes.size(); ++i)
+    check_normal(collider.planes[i].normal, part.in("planes").in(i));
+  part.in("to").require(collider.shape != "cylinder" || collider.from != collider.to,
+                        "\"from\" and \"to\" are the same point", "move one of them");
+  if (collider.sequence)
+    check_order(part.in("sequence").in("last"), collider.sequence->first, collider.sequence->last,
+                "first", "last");
+  if (collider.motion) check_motion(*collider.motion, part.in("motion"));
+}
+
+void check_colliders(const Scene& scene, const Part& part) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
+    const std::string& name = scene.colliders[i].name;
+    part.in(i).in("name").require(names.insert(name).second,
+                                  fmt::format("a second collider named \"{}\"", printable(name)),
+                                  "give each collider its own \"name\"");
+    check_collider(scene.colliders[i], part.in(i));
+  }
+}
+
 void check_expectation(const Expectation& expected, const Scene& scene, const Part& part) {
   check_order(part.in("max"), expected.min, expected.max, "min", "max");
   std::vector<std::string> names;
@@ -198,6 +239,7 @@ void check_rules(const Scene& scene, const Document& document) {
       "the camera looks at its own position", "move \"target\" or \"position\"");
   for (std::size_t i = 0; i < scene.seams.size(); ++i)
     check_seam(scene.seams[i], scene, root.in("seams").in(i));
+  check_colliders(scene, root.in("colliders"));
   for (std::size_t i = 0; i < scene.expect.size(); ++i)
     check_expectation(scene.expect[i], scene, root.in("expect").in(i));
 }
