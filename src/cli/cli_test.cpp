@@ -89,8 +89,8 @@ TEST_F(Cli, HelpStartsWithExamplesAndVersionIsPrinted) {
   const Result help = call("--help");
   EXPECT_EQ(help.code, 0);
   EXPECT_LT(help.out.find("Examples:"), help.out.find("Options:"));
-  for (const char* command : {"run", "render", "partition", "tune", "compare", "sweep", "check",
-                              "env", "schema", "doctor", "scenes"}) {
+  for (const char* command : {"run", "render", "partition", "tune", "compare", "sweep", "ccd",
+                              "check", "env", "schema", "doctor", "scenes"}) {
     EXPECT_NE(help.out.find(command), std::string::npos) << command;
     EXPECT_EQ(call(std::string(command) + " --help").code, 0) << command;
   }
@@ -529,6 +529,65 @@ TEST_F(CliPictures, NoStateLeavesNoState) {
   ASSERT_EQ(call("run " + scene(12, 2) + " --size 160x120 --no-state -o " + dir("n")).code, 0);
   EXPECT_TRUE(fs::exists(dir("n/frame_0002.png")));
   EXPECT_FALSE(fs::exists(dir("n/state")));
+}
+
+/// One query: a vertex above a triangle and, if `hit`, below it at the end. Numbers that need GMP.
+std::string vertex_face_query(bool hit, bool truth, const std::string& end = "\n") {
+  const std::string zeros(60, '0');
+  const char* points[] = {"1,5,1,5,1,1", "0,1,0,1,0,1", "1,1,0,1,0,1", "0,1,1,1,0,1"};
+  std::string text;
+  for (int i = 0; i < 8; ++i) {
+    const bool last_vertex = i == 4 && hit;
+    text += last_vertex ? fmt::format("1{0},5{0},1,5,-1,1", zeros) : points[i % 4];
+    text += fmt::format(",{}{}", truth ? 1 : 0, end);
+  }
+  return text;
+}
+
+TEST_F(Cli, CcdJudgesAFileOfQueries) {
+  const std::string path = dir("q.csv");
+  write_file_atomically(path, vertex_face_query(true, true) + vertex_face_query(false, false) +
+                                  vertex_face_query(true, false, "\r\n"));
+  for (const char* method : {"halley", "newton", "additive"}) {
+    const Result result = call(fmt::format("ccd {} --kind vf --json --method {}", path, method));
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto json = nlohmann::json::parse(result.out);
+    EXPECT_EQ(json.at("queries"), 3);
+    EXPECT_EQ(json.at("hits"), 1);
+    EXPECT_EQ(json.at("missed"), 0);
+    EXPECT_EQ(json.at("false_positives"), 1);
+    EXPECT_EQ(json.at("kind"), "vf");
+    EXPECT_EQ(json.at("rounded_coordinates"), 8 + 2 * 2);  // 1/5
+    EXPECT_GT(json.at("median_ns"), 0);
+    EXPECT_GE(json.at("p99_ns"), json.at("median_ns"));
+  }
+  const Result table = call("ccd " + path + " --kind vf");
+  EXPECT_EQ(table.code, 0);
+  EXPECT_NE(table.out.find("false positives  1"), std::string::npos) << table.out;
+  EXPECT_NE(table.err.find("rounded"), std::string::npos);
+  const Result wide = call("ccd " + path + " --kind vf --json --min-separation 1.5");
+  EXPECT_EQ(nlohmann::json::parse(wide.out).at("false_positives"), 2);
+}
+
+TEST_F(Cli, CcdSaysWhatItMissed) {
+  write_file_atomically(dir("vertex-face.csv"), vertex_face_query(false, true));
+  const Result result = call("ccd " + dir("vertex-face.csv"));  // the truth is a lie
+  EXPECT_EQ(result.code, 5);
+  EXPECT_NE(result.err.find("1 of 1 meetings were missed"), std::string::npos) << result.err;
+  EXPECT_NE(result.out.find("missed           1"), std::string::npos) << result.out;
+}
+
+TEST_F(Cli, CcdNeedsAKindAndASoundFile) {
+  write_file_atomically(dir("q.csv"), vertex_face_query(true, true));
+  EXPECT_EQ(call("ccd " + dir("q.csv")).code, 2);
+  EXPECT_EQ(call("ccd " + dir("q.csv") + " --kind xx").code, 2);
+  EXPECT_EQ(call("ccd " + dir("q.csv") + " --kind vf --min-separation=-1").code, 2);
+  EXPECT_EQ(call("ccd " + dir("none.csv") + " --kind vf").code, 3);
+  write_file_atomically(dir("edge-edge.csv"), vertex_face_query(true, true) + "0,1,0,0,0,1,1\n");
+  const Result bad = call("ccd " + dir("edge-edge.csv"));
+  EXPECT_EQ(bad.code, 3);
+  EXPECT_NE(bad.err.find("edge-edge.csv:9: a denominator is zero"), std::string::npos) << bad.err;
+  EXPECT_TRUE(bad.out.empty());
 }
 
 /// Every scene that comes along keeps its own promises.

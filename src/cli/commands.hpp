@@ -29,6 +29,7 @@ void add_partition(CLI::App& program, Action& action, const Verbosity& verbosity
 void add_tune(CLI::App& program, Action& action, const Verbosity& verbosity);
 void add_compare(CLI::App& program, Action& action);
 void add_sweep(CLI::App& program, Action& action, const Verbosity& verbosity);
+void add_ccd(CLI::App& program, Action& action);
 void add_check(CLI::App& program, Action& action);
 void add_env(CLI::App& program, Action& action);
 void add_schema(CLI::App& program, Action& action);

@@ -64,6 +64,7 @@ int run_program(int argc, char** argv) {
   add_tune(program, action, verbosity);
   add_compare(program, action);
   add_sweep(program, action, verbosity);
+  add_ccd(program, action);
   add_check(program, action);
   add_env(program, action);
   add_schema(program, action);

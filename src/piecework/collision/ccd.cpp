@@ -11,8 +11,8 @@
 // 1. Elements that touch are coplanar: the cubic f(t) = det(p, q, r) of three differences between
 //    their vertices is zero. Where |f| exceeds its rounding error there is no contact.
 // 2. Along any fixed axis n, the separation of the two convex elements is the smallest of the
-//    numbers n . (difference of two vertices), each linear in t, and is no larger than n times the
-//    distance. So an axis found in whatever way proves a whole interval free of contact.
+//    numbers n . (difference of two vertices), each linear in t, and is no larger than |n| times
+//    the distance. So an axis found in whatever way proves a whole interval free of contact.
 //
 // The cubic says where contact is possible at all, closest points supply good axes, and neither has
 // to be accurate for the answer to be safe.
@@ -21,12 +21,11 @@ namespace piecework::collision {
 namespace {
 
 constexpr double kUnit = 0x1p-53;  // relative error of one rounding
-constexpr double kSmallest = 1e-45,
-                 kLargest = 1e45;  // squares of volumes neither under nor overflow
+// Between these, squares of volumes neither underflow nor overflow.
+constexpr double kSmallest = 1e-45, kLargest = 1e45;
 constexpr int kMaxRootSteps = 24;  // of Halley or Newton before bisection takes over
 constexpr int kMaxSteps = 256;     // of conservative advancement before it stops, which is a hit
-constexpr double kSlow =
-    0.5;  // a step longer than this part of the last one: the sequence converges slowly
+constexpr double kSlow = 0.5;      // steps that shrink by less than this call for longer ones
 
 /// Differences between each vertex of the first element and each of the second, at both ends of
 /// the motion. Taken between given numbers, each has one rounding error, relative to itself; hence
@@ -191,8 +190,11 @@ Pieces monotone_pieces(const Cubic& f) {
 
 class Search {
  public:
-  Search(const Motion& motion, const CcdOptions& options)
-      : motion_(motion), options_(options), tolerance_(std::max(1e-14, options.tolerance)) {}
+  Search(const Motion& motion, const CcdOptions& options, double separation)
+      : motion_(motion),
+        options_(options),
+        separation_(separation),
+        tolerance_(std::max(1e-14, options.tolerance)) {}
 
   /// Advances from `from` to `to`, axis by axis; stops early where `left(t)`, which says that
   /// contact has become impossible again. True when it cannot go on: a hit.
@@ -204,7 +206,7 @@ class Search {
     double t = from, last_step = 1, stretch = 2;
     Vec3 axis = axis_at(t);
     for (int steps = 0; steps < kMaxSteps; ++steps) {
-      const double until = separated_until(motion_, axis, t, options_.min_separation);
+      const double until = separated_until(motion_, axis, t, separation_);
       if (until >= to) return false;
       const double step = until - t;
       if (step <= tolerance_) break;
@@ -212,7 +214,7 @@ class Search {
       if (step > kSlow * last_step) {
         const double ahead = std::min(to, t + stretch * step);
         const Vec3 turned = axis_at(ahead);
-        if (separated_between(motion_, axis, t, turned, ahead, options_.min_separation)) {
+        if (separated_between(motion_, axis, t, turned, ahead, separation_)) {
           if (ahead >= to) return false;
           next = ahead, axis = turned, stretch *= 2;
         } else {
@@ -256,6 +258,7 @@ class Search {
 
   const Motion& motion_;
   const CcdOptions& options_;
+  double separation_;
   double tolerance_;
   CcdResult result_;
 };
@@ -266,10 +269,11 @@ CcdResult first_contact(PairKind kind, const PairPoints& start, const PairPoints
                         const CcdOptions& options) {
   const Motion motion = relative_motion(kind, start, end);
   if (!motion.computable) return {.hit = true, .time = 0};
-  if (separated_until(motion, axis_between_centres(motion), 0, options.min_separation) >= 1)
+  const double separation = std::max(0.0, options.min_separation);
+  if (separated_until(motion, axis_between_centres(motion), 0, separation) >= 1)
     return {.evaluations = 1};
-  Search search(motion, options);
-  if (options.min_separation > 0 || options.method == CcdMethod::Additive) {
+  Search search(motion, options, separation);
+  if (separation > 0 || options.method == CcdMethod::Additive) {
     search.meets(0, 1, [](double) { return false; });
     return search.result();
   }

@@ -20,14 +20,14 @@ enum class CcdMethod : std::uint8_t {
 struct CcdOptions {
   CcdMethod method = CcdMethod::Halley;
   double tolerance = 1e-9;    ///< of the time, fraction of the motion; at least 1e-14 is used
-  double min_separation = 0;  ///< m, >= 0; a pair that comes as close as this has met
+  double min_separation = 0;  ///< m; below 0 is 0. A pair that comes as close as this has met
 };
 
 struct CcdResult {
   bool hit = false;
   double time = 1;        ///< fraction of the motion that is safe, in [0, 1]: never late
   int evaluations = 0;    ///< of the cubic and of the distance
-  bool additive = false;  ///< needed more than one distance at a time (degenerate motion)
+  bool additive = false;  ///< needed more than one axis on the way (degenerate motion)
 };
 
 /// Whether the pair meets on the way from `start` to `end` (t = 0 and 1), and when: the first t at

@@ -2,9 +2,9 @@
 
 #include <piecework/collision/ccd_oracle.hpp>
 
-#include <array>
+#include <algorithm>
+#include <optional>
 #include <string>
-#include <vector>
 
 #include <gtest/gtest.h>
 
