@@ -39,6 +39,7 @@ struct DdPdOptions {
   AccelerationOptions acceleration;
   NormalPart normals = NormalPart::Automatic;
   NewtonUse newton = NewtonUse::Touching;
+  ContactSolve contact_solve;
   int friction_renewals = 1;  ///< times that a converged step takes up the pressure it has found
   /// Sweeps over the constraints of each domain before they are projected together [Lu25, Sec. 5];
   /// absent: constraint-parallel projections only. SweepForm::LiteralEq12 may raise E and is taken

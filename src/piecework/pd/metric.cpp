@@ -37,18 +37,20 @@ global::TreeOptions normal_options(const SparseMatrix& K) {
 }  // namespace
 
 Metric::Metric(const model::ClothModel& model, SparseMatrix K,
-               std::unique_ptr<global::ExactSolver> solver)
+               std::unique_ptr<global::ExactSolver> solver, const ContactSolve& contact_solve)
     : model_(model),
       K_(std::move(K)),
       solver_(std::move(solver)),
       normal_solver_(normal_options(K_)),
-      contact_solver_(normal_options(K_)) {}
+      contact_solver_(normal_options(K_)),
+      contact_solve_(contact_solve) {}
 
 Metric::~Metric() = default;
 
 void Metric::prepare(const std::vector<char>& fixed) {
   normals_in_use_ = contact_in_use_ = contact_analysed_ = false;
   normal_.reset();
+  diagonal_.reset();
   reduction_ = model::Reduction(model_, fixed);
   reduced_ = reduction_.system(K_);
   const auto status = solver_->factor(reduced_, reduction_.vertices());
@@ -56,6 +58,7 @@ void Metric::prepare(const std::vector<char>& fixed) {
 }
 
 global::TreeSolver* Metric::stretch_tree() {
+  if (contact_in_use_ && diagonal_) return nullptr;
   return contact_in_use_ ? &contact_solver_ : solver_->tree();
 }
 
@@ -87,10 +90,7 @@ void Metric::find_contact(const model::ContactTerms& contact) {
   });
 }
 
-bool Metric::factor_with(const Eigen::VectorXd& D) {
-  contact_in_use_ = false;
-  if (D.size() == 0 || !((D.array() > kWorthFactoring * reduced_.diagonal().array()).any()))
-    return true;
+void Metric::factor_anew(const Eigen::VectorXd& D) {
   if (!contact_analysed_) {
     if (const global::TreeSolver* tree = solver_->tree())
       contact_solver_.share_analysis(*tree);
@@ -107,6 +107,22 @@ bool Metric::factor_with(const Eigen::VectorXd& D) {
         D[static_cast<Eigen::Index>(column)];
   });
   contact_in_use_ = contact_solver_.factor(contact_values_) == global::SolveStatus::Ok;
+}
+
+bool Metric::factor_with(const Eigen::VectorXd& D) {
+  contact_in_use_ = false;
+  if (D.size() == 0 || !((D.array() > kWorthFactoring * reduced_.diagonal().array()).any()))
+    return true;
+  if (contact_solve_.method == global::DiagonalMethod::Refactor) {
+    factor_anew(D);
+    return contact_in_use_;
+  }
+  if (!diagonal_) {
+    diagonal_ = global::make_diagonal_solver(contact_solve_.method, contact_solve_.options);
+    if (diagonal_->prepare(reduced_, *solver_->tree()) != global::SolveStatus::Ok) return false;
+  }
+  contact_in_use_ = diagonal_->update({D.data(), static_cast<std::size_t>(D.size())}) ==
+                    global::SolveStatus::Ok;
   return contact_in_use_;
 }
 
@@ -136,6 +152,11 @@ bool Metric::refresh_normals(const Positions& x, const model::ContactTerms* cont
 void Metric::solve_stretch(const Positions& g, Positions& d) {
   if (global::TreeSolver* tree = stretch_tree()) {
     (void)tree->solve(g.data(), d.data(), 3, 3, 1);
+    return;
+  }
+  if (contact_in_use_ && diagonal_) {
+    d.setZero();
+    (void)diagonal_->solve(g, d, {contact_solve_.tolerance, contact_solve_.max_iterations, {}});
     return;
   }
   columns_ = g;

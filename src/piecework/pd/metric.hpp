@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 
+#include <piecework/global/diagonal_update.hpp>
 #include <piecework/global/exact_solver.hpp>
 #include <piecework/model/contact_terms.hpp>
 #include <piecework/model/reduction.hpp>
@@ -20,11 +21,20 @@
 
 namespace piecework::pd {
 
+/// How K~ + D is solved.
+struct ContactSolve {
+  /// Anything but Refactor needs a solver that is a tree.
+  global::DiagonalMethod method = global::DiagonalMethod::Refactor;
+  global::DiagonalOptions options;
+  double tolerance = 1e-2;  ///< DiagonalLimits::tolerance
+  int max_iterations = 50;
+};
+
 class Metric {
  public:
   /// \param K  assemble_system(), |V| x |V|, N/m.  \param solver  of K~
   Metric(const model::ClothModel& model, SparseMatrix K,
-         std::unique_ptr<global::ExactSolver> solver);
+         std::unique_ptr<global::ExactSolver> solver, const ContactSolve& contact_solve = {});
   ~Metric();
 
   /// Factors K~ for a set of held vertices and forgets Kn.
@@ -55,10 +65,11 @@ class Metric {
  private:
   void solve_stretch(const Positions& g, Positions& d);
   void find_contact(const model::ContactTerms& contact);
-  /// Factors K~ + D, unless D is little beside it.
+  void factor_anew(const Eigen::VectorXd& D);
+  /// Makes K~ + D ready to be solved, unless D is little beside it.
   bool factor_with(const Eigen::VectorXd& D);
   void remove_normals(Positions& rows) const;
-  /// The tree of K~, with D_across if there is any; null: the solver is no tree.
+  /// The tree of K~ + D; null: it is not solved by one.
   [[nodiscard]] global::TreeSolver* stretch_tree();
 
   const model::ClothModel& model_;
@@ -80,6 +91,8 @@ class Metric {
   global::TreeSolver contact_solver_;   ///< of K~ + D
   bool contact_analysed_ = false;
   bool contact_in_use_ = false;
+  ContactSolve contact_solve_;
+  std::unique_ptr<global::DiagonalUpdateSolver> diagonal_;  ///< absent: K~ + D is refactored
   std::vector<double> contact_values_;  ///< of K~ + D
   Positions vertex_normals_, tangential_;
 };

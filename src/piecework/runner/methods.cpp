@@ -12,6 +12,7 @@
 #include <piecework/baselines/xpbd.hpp>
 #include <piecework/contact/contact.hpp>
 #include <piecework/core/error.hpp>
+#include <piecework/model/assembly.hpp>
 #include <piecework/pd/dd_pd.hpp>
 #include <piecework/pd/primal_dual_step.hpp>
 
@@ -96,6 +97,34 @@ std::optional<local::SweepOptions> sweeps(const scene::Solver& solver) {
                                                                     : local::SweepForm::Corrected};
 }
 
+global::DiagonalMethod contact_method(const std::string& name) {
+  if (name == "woodbury_sd_pcg") return global::DiagonalMethod::SteepestDescent;
+  for (int i = 0; i < global::kNumDiagonalMethods; ++i) {
+    const auto method = static_cast<global::DiagonalMethod>(i);
+    if (name == to_string(method)) return method;
+  }
+  return global::DiagonalMethod::Refactor;
+}
+
+/// \throws InputError if the scene's global solve has no tree to solve on.
+pd::ContactSolve contact_solve(const World& world) {
+  const scene::Scene& scene = world.scene;
+  pd::ContactSolve solve{.method = contact_method(scene.solver.contact),
+                         .options = {},
+                         .tolerance = scene.quality.pcg_tol,
+                         .max_iterations = scene.quality.pcg_max};
+  solve.options.domains = std::max(1, scene.solver.domains);
+  solve.options.steps = scene.quality.sd_iterations;
+  solve.options.elastic_weight =
+      model::assemble_system(world.model, scene.step.h).diagonal().mean();
+  if (solve.method != global::DiagonalMethod::Refactor && scene.solver.global != "tree")
+    throw InputError(fmt::format(
+        "{}: /solver/contact: \"{}\" works on the tree only; take `global: tree`, or `contact: "
+        "refactor`",
+        scene.source, scene.solver.contact));
+  return solve;
+}
+
 std::unique_ptr<model::Minimizer> make_dd_pd(const MethodContext& context) {
   const scene::Scene& scene = context.world.scene;
   return std::make_unique<pd::DdPd>(
@@ -106,6 +135,10 @@ std::unique_ptr<model::Minimizer> make_dd_pd(const MethodContext& context) {
                       .acceleration = acceleration(scene.quality),
                       .normals = scene.quality.accelerate == "lbfgs_kn" ? pd::NormalPart::Automatic
                                                                         : pd::NormalPart::Never,
+                      .newton = scene.quality.newton == "never" ? pd::NewtonUse::Never
+                                                                : pd::NewtonUse::Touching,
+                      .contact_solve = contact_solve(context.world),
+                      .friction_renewals = scene.quality.friction_renewals,
                       .sweeps = sweeps(scene.solver)},
       make_exact_solver(context.world), &context.world.domains);
 }

@@ -120,6 +120,7 @@ struct Solver {
   double corner_fraction = 0.5;
   std::string interface = "recursive";
   std::string seams = "elimination";
+  std::string contact = "refactor";
   int threads = 0;  ///< 0: what the machine allows
   std::string hessian = "projected";
   std::string linear = "cholmod";
@@ -139,6 +140,11 @@ struct Quality {
   int window = 5;                       ///< remembered iterates
   std::string precision = "automatic";  ///< "automatic" | "double" | "single"
   std::string ccd = "halley";
+  std::string newton = "touching";
+  int friction_renewals = 1;
+  double pcg_tol = 1e-2;
+  int pcg_max = 50;
+  int sd_iterations = 1;
   std::string preset = "default";  ///< which row of quality_presets() the other members start from
 
   bool operator==(const Quality&) const = default;

@@ -271,6 +271,23 @@ void fields(V& v, Solver& s) {
        {"dual",
         "with `global: primal_dual` only: they keep unknowns of their own, and multipliers hold "
         "them in place, as the paper has it (corrected)"}});
+  v.choice(
+      {"contact",
+       "`global: tree`: how the system with what contact adds to its diagonal is solved"},
+      s.contact,
+      {{"refactor", "exactly: the matrix is factored anew when the metric is"},
+       {"adaptive", "conjugate gradients on the last factor until counts speak for a new one"},
+       {"pcg_last_factor", "conjugate gradients on the first factor with contact"},
+       {"low_rank", "the last factor, and Woodbury's formula for the few vertices that changed"},
+       {"frozen_schur",
+        "conjugate gradients; the interiors of the domains are factored anew, what joins them not"},
+       {"woodbury_sd_pcg",
+        "the paper's: steepest descent on the contacts, then conjugate gradients on the factor "
+        "without contact; in residual form, so without its bias"},
+       {"kinv_pcg", "conjugate gradients on the factor without contact"},
+       {"jacobi_pcg", "conjugate gradients on the diagonal"},
+       {"hybrid", "the same on the factor without contact, corrected on the contacts"},
+       {"dual", "conjugate gradients on the contact forces"}});
   v.value({"threads", "worker threads; 0: what affinity and cgroup quota allow"}, s.threads,
           between(0, 1024));
 }
@@ -339,6 +356,23 @@ void fields(V& v, Quality& q) {
              "bits are used and the run says so"}});
   v.choice({"ccd", "root finder of continuous collision detection; both are conservative"}, q.ccd,
            {{"halley", "third order, the paper's"}, {"newton", "second order"}});
+  v.choice({"newton",
+            "`method: dd_pd`: when Newton's direction, by conjugate gradients in the metric, takes "
+            "the place of the accelerated one"},
+           q.newton,
+           {{"touching", "while anything touches: few iterations, so few detections"},
+            {"never", "never: `accelerate` alone, with contact in the global solve"}});
+  v.value({"friction_renewals",
+           "times that a converged step takes up the pressure that it has found, which friction is "
+           "proportional to, and converges again; 0: that of the step before alone"},
+          q.friction_renewals, between(0, 100));
+  v.value({"pcg_tol",
+           "`solver.contact` by conjugate gradients: residual at which they end, relative, as a "
+           "displacement"},
+          q.pcg_tol, above(0, 1));
+  v.value({"pcg_max", "the same: iterations at most"}, q.pcg_max, between(1, 100000));
+  v.value({"sd_iterations", "`contact: woodbury_sd_pcg`: steps of steepest descent"},
+          q.sd_iterations, between(0, 100));
 }
 
 template <class V>

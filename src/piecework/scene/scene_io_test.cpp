@@ -30,11 +30,13 @@ constexpr const char* kEveryKey = R"({
             "gust_amplitude": 0.25, "gust_period": 3 },
   "damping": 0.125,
   "solver": { "method": "vanilla_pd", "global": "primal_dual", "local": "jacobi", "domains": 5,
-              "corner_fraction": 0.25, "interface": "dense", "seams": "dual",
+              "corner_fraction": 0.25, "interface": "dense", "seams": "dual", "contact": "adaptive",
               "domain_weights": [1, 1, 1, 0.5, 0.25],
               "threads": 3, "hessian": "unprojected", "linear": "pcg", "chebyshev_rho": 0.75 },
   "quality": { "stop": "dx_rms", "tolerance": 1e-3, "max_iterations": 11, "min_iterations": 2,
                "accelerate": "anderson", "window": 7, "precision": "single", "ccd": "newton",
+               "newton": "never", "friction_renewals": 3, "pcg_tol": 0.5, "pcg_max": 9,
+               "sd_iterations": 5,
                "preset": "reference" },
   "self_collision": true, "friction": 0.5,
   "contact": { "distance": 0.002, "stiffness": 100, "barrier": "ipc", "slip_speed": 0.01,
@@ -158,9 +160,10 @@ Scene expected_every_key() {
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;
   scene.solver = {"vanilla_pd", "primal_dual", "jacobi", 5, {1, 1, 1, 0.5, 0.25},
-                  0.25,         "dense",       "dual",   3, "unprojected",
+                  0.25,         "dense",       "dual",   "adaptive", 3, "unprojected",
                   "pcg",        0.75};
-  scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single", "newton", "reference"};
+  scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single",
+                   "newton", "never", 3, 0.5, 9, 5, "reference"};
   scene.self_collision = true, scene.friction = 0.5;
   scene.contact = {0.002, 100, "ipc", 0.01, false};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
