@@ -111,7 +111,9 @@ class LastFactor final : public FactorUpdate {
   }
 };
 
-/// Few changes: CG on the last factor, until its iterations have cost as much as a refactorisation.
+/// Mild or very few changes: CG on the last factor, until its iterations have cost as much as a new
+/// one. If D <= c D_factored and D_factored <= c D, then K + D and K + D_factored are equal up to
+/// c too, and the condition is c^2 at most; every row beyond adds one eigenvalue outside.
 class Adaptive final : public FactorUpdate {
  public:
   using FactorUpdate::FactorUpdate;
@@ -120,16 +122,19 @@ class Adaptive final : public FactorUpdate {
   SolveStatus update_method() override {
     spent_ += std::max(0, std::exchange(last_iterations_, 0) - 1);
     const std::vector<int> rows = changed_rows();
-    if (has_factor() && (rows.empty() || (few(rows) && spent_ <= options_.refactor_iterations)))
-      return SolveStatus::Ok;
+    const bool keep =
+        changes(rows) <= options_.refactor_changes && spent_ <= options_.refactor_iterations;
+    if (has_factor() && (rows.empty() || keep)) return SolveStatus::Ok;
     spent_ = 0;
     return refactor(rows);
   }
 
-  [[nodiscard]] bool few(const std::vector<int>& rows) const {
-    const auto either = ((diagonal_.array() > 0) || (factored_.array() > 0)).count();
-    return static_cast<double>(rows.size()) <=
-           options_.refactor_fraction * static_cast<double>(either);
+  /// Rows where D differs by more than the mild factor.
+  [[nodiscard]] std::ptrdiff_t changes(const std::vector<int>& rows) const {
+    return std::count_if(rows.begin(), rows.end(), [&](int v) {
+      const auto [low, high] = std::minmax(diagonal_[v], factored_[v]);
+      return high > options_.mild_change * low;
+    });
   }
 
   int spent_ = 0;  ///< iterations beyond the first of each solve, since the last factorisation

@@ -132,32 +132,37 @@ DiagonalReport DiagonalUpdateSolver::solve(const Positions& b, Positions& x,
   if (b.rows() != rows || x.rows() != rows)
     throw InputError(fmt::format("contact system: {} rows of b and {} of x for a matrix of {}",
                                  b.rows(), x.rows(), rows));
-  report_ = {.applications = report_.applications, .refactored_rows = report_.refactored_rows};
-  if (!ready_) return report_;
+  if (ready_) run(b, x, limits);
+  last_iterations_ = report_.iterations;
+  return std::exchange(report_, DiagonalReport{});
+}
+
+/// Runs of the method, each from the true residual, until that is met or a run gains nothing.
+void DiagonalUpdateSolver::run(const Positions& b, Positions& x, const DiagonalLimits& limits) {
   scale_ = 1;
   scale_ = measure(b);
   if (scale_ == 0) {
     x.setZero();
     report_.status = DiagonalStatus::Converged;
-    return report_;
+    return;
   }
   start(b, x);
   report_.status = DiagonalStatus::NotConverged;
   if (limits.observer && !limits.observer(0, x)) report_.status = DiagonalStatus::Stopped;
   double before = std::numeric_limits<double>::infinity();
   while (report_.status == DiagonalStatus::NotConverged) {
-    multiply(x, residual_);  // the truth, where the recurrence has drifted
-    for_each_row(rows, [&](Eigen::Index v) { residual_.row(v) = b.row(v) - residual_.row(v); });
+    multiply(x, residual_);
+    for_each_row(x.rows(), [&](Eigen::Index v) { residual_.row(v) = b.row(v) - residual_.row(v); });
     report_.residual = measure(residual_);
-    if (report_.residual <= limits.tolerance) report_.status = DiagonalStatus::Converged;
-    if (report_.iterations >= limits.max_iterations || !(report_.residual < kStagnation * before) ||
-        report_.residual <= limits.tolerance)
-      break;
+    if (report_.residual <= limits.tolerance) {
+      report_.status = DiagonalStatus::Converged;
+      return;
+    }
+    const bool progress = report_.residual < kStagnation * before;  // false for NaN
+    if (report_.iterations >= limits.max_iterations || !progress) return;
     before = report_.residual;
     iterate(x, residual_, limits);
   }
-  last_iterations_ = report_.iterations;
-  return std::exchange(report_, DiagonalReport{});
 }
 
 std::unique_ptr<DiagonalUpdateSolver> make_diagonal_solver(DiagonalMethod method,

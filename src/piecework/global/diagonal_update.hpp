@@ -39,14 +39,18 @@ struct DiagonalOptions {
   /// Of the factors that methods keep beside K's. 32 bits lose nothing here: every method iterates
   /// on residuals. A matrix that is not positive definite in 32 bits is factored in 64.
   Precision precision = Precision::Single;
-  /// Adaptive: refactor if more than this part of the union of old and new set has changed, or if
-  /// the newest solve took more iterations than that. Counts, not clocks: the choice is the same
-  /// on every machine. Measured: results/tables/contact.md.
-  double refactor_fraction = 0.02;
-  int refactor_iterations = 12;
-  /// LowRank: rows at most; with more it refactors. A solve of K + D costs as much as three of
-  /// them.
-  int max_rank = 48;
+  /// Adaptive: a row has changed if D_v has by more than this factor, from or to zero included.
+  /// CG on the last factor takes about one iteration for each such row; all others together leave
+  /// a condition of its square at most.
+  double mild_change = 1.5;
+  /// Adaptive: refactor if more rows than this have changed, or if CG has taken so many iterations
+  /// since the last factor, the first of each solve not counted. Counts, not clocks: the choice is
+  /// the same on every machine. Measured: one isolated change costs CG what refactoring costs
+  /// (results/tables/contact.md).
+  int refactor_changes = 1;
+  int refactor_iterations = 8;
+  /// LowRank: rows at most; with more it refactors. Three rows cost a solve.
+  int max_rank = 12;
   /// FrozenSchur: number of interiors (subtrees of the elimination tree) at least.
   int domains = 16;
   /// SteepestDescent: steps on the contacts, and the paper's w_i (N/m) in 1 + w_i / D_v. Without
@@ -136,6 +140,8 @@ class DiagonalUpdateSolver {
   int last_iterations_ = 0;    ///< of the newest solve
 
  private:
+  void run(const Positions& b, Positions& x, const DiagonalLimits& limits);
+
   bool ready_ = false;
   double scale_ = 0;  ///< max |b_v| / (K + D)_vv
   Positions residual_, z_, p_, Ap_;

@@ -363,19 +363,32 @@ struct Dense {
     if (r < rows) solve_right_rows<1>(l, ldl, width, x + r, ldx);
   }
 
+  /// Columns c ... c + K - 1 of Z: the rows of Y from c on, each times its numbers in them. Several
+  /// columns at once, or every sum would wait for the one before.
+  template <int K>
+  static void square_columns(const T* y, int ldy, int width, int c, T* z, int ldz, const T* work) {
+    for (int r = 0; r < width; r += kSize) {
+      V sum[K];
+      unroll<K>([&](auto i) PIECEWORK_INLINE { sum[i] = S::zero(); });
+      for (int k = c; k < width; ++k) {
+        const V row = S::load(work + r + static_cast<long>(k) * ldy);
+        unroll<K>([&](auto i) PIECEWORK_INLINE {
+          sum[i] = S::fma(row, S::repeat(y[k + static_cast<long>(c + i) * ldy]), sum[i]);
+        });
+      }
+      unroll<K>([&](auto i)
+                    PIECEWORK_INLINE { S::store(z + r + static_cast<long>(c + i) * ldz, sum[i]); });
+    }
+  }
+
   static void square(const T* y, int ldy, int width, T* z, int ldz, T* work) {
-    // Column c of Z: the rows of Y from c on, each times its number in column c.
     for (int c = 0; c < width; ++c)
       for (int r = 0; r < width; ++r)
         work[c + static_cast<long>(r) * ldy] = y[r + static_cast<long>(c) * ldy];
-    for (int c = 0; c < width; ++c)
-      for (int r = 0; r < width; r += kSize) {
-        V sum = S::zero();
-        for (int k = c; k < width; ++k)
-          sum = S::fma(S::load(work + r + static_cast<long>(k) * ldy),
-                       S::repeat(y[k + static_cast<long>(c) * ldy]), sum);
-        S::store(z + r + static_cast<long>(c) * ldz, sum);
-      }
+    int c = 0;
+    for (; c + 8 <= width; c += 8) square_columns<8>(y, ldy, width, c, z, ldz, work);
+    for (; c + 4 <= width; c += 4) square_columns<4>(y, ldy, width, c, z, ldz, work);
+    for (; c < width; ++c) square_columns<1>(y, ldy, width, c, z, ldz, work);
   }
 
   static void add(T* to, const T* from, int count) {

@@ -370,7 +370,7 @@ void Factorizer<T, N>::keep_update(int f, const FrontMatrix<N>& matrix) {
   if (frozen(f)) return;
   const auto rows = static_cast<std::size_t>(matrix.rows);
   auto& update = updates_[static_cast<std::size_t>(f)];
-  update = AlignedArray<N>(rows * rows);
+  if (update.size() != rows * rows) update = AlignedArray<N>(rows * rows);
   copy_update(matrix, update.data());
 }
 
