@@ -98,7 +98,6 @@ std::optional<local::SweepOptions> sweeps(const scene::Solver& solver) {
 }
 
 global::DiagonalMethod contact_method(const std::string& name) {
-  if (name == "woodbury_sd_pcg") return global::DiagonalMethod::SteepestDescent;
   for (int i = 0; i < global::kNumDiagonalMethods; ++i) {
     const auto method = static_cast<global::DiagonalMethod>(i);
     if (name == to_string(method)) return method;
