@@ -34,8 +34,8 @@ bool BlockPcg::invert_diagonal(const model::HessianMatrix& H) {
   return positive;
 }
 
-PcgReport BlockPcg::solve(const model::HessianMatrix& H, const Positions& b, const PcgOptions& options,
-                          Positions& x) {
+PcgReport BlockPcg::solve(const model::HessianMatrix& H, const Positions& b,
+                          const PcgOptions& options, Positions& x) {
   PcgReport report;
   x.setZero(b.rows(), 3);
   report.indefinite = !invert_diagonal(H);

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include <piecework/model/hessian_matrix.hpp>
 #include <piecework/core/types.hpp>
+#include <piecework/model/hessian_matrix.hpp>
 
 namespace piecework::baselines {
 

@@ -3,11 +3,11 @@
 // Newton's method on the incremental potential: the reference for accuracy, and a rival.
 
 #include <piecework/baselines/block_pcg.hpp>
-#include <piecework/model/hessian_matrix.hpp>
 #include <piecework/baselines/rounding.hpp>
 #include <piecework/global/cholmod_solver.hpp>
 #include <piecework/local/jacobi.hpp>
 #include <piecework/model/convergence.hpp>
+#include <piecework/model/hessian_matrix.hpp>
 #include <piecework/model/reduction.hpp>
 #include <piecework/model/stepper.hpp>
 

@@ -83,12 +83,12 @@ Contact::Contact(const model::ClothModel& model, ContactOptions options, const C
       slack_(list_slack(model, options.activation.distance)),
       near_(collision::make_surface(model.triangles, model.num_vertices(), obstacles_.triangles(),
                                     obstacles_.num_vertices(), options.self),
-            std::max(options.activation.distance,
-                     obstacles_.distance(options.activation.distance)),
+            std::max(options.activation.distance, obstacles_.distance(options.activation.distance)),
             slack_) {
   obstacles_.place(0, rest_obstacles_);
   const auto rubs = [](const auto& collider) { return collider.traits().friction.has_value(); };
-  has_friction_ = options.friction || std::any_of(colliders.bodies.begin(), colliders.bodies.end(), rubs) ||
+  has_friction_ = options.friction ||
+                  std::any_of(colliders.bodies.begin(), colliders.bodies.end(), rubs) ||
                   std::any_of(colliders.meshes.begin(), colliders.meshes.end(), rubs);
 }
 
@@ -193,7 +193,8 @@ void Contact::find_active_pairs(std::span<const NearPair> pairs, const Points& p
         }
       },
       1);
-  for (const auto& block : active_blocks_) active_.insert(active_.end(), block.begin(), block.end());
+  for (const auto& block : active_blocks_)
+    active_.insert(active_.end(), block.begin(), block.end());
 }
 
 void Contact::find_active(const Positions& x) {
@@ -288,10 +289,10 @@ void Contact::hessian(std::vector<model::ContactBlock>& blocks) const {
     add_block(pair.vertices, pair.count, pair.beta,
               pair.curvature * pair.normal * pair.normal.transpose(), blocks);
   for (const FrictionPair& pair : sliding_)
-    add_block(pair.vertices, pair.count, pair.beta,
-              pair.limit * pair.force_ratio *
-                  (Mat3::Identity() - pair.normal * pair.normal.transpose()),
-              blocks);
+    add_block(
+        pair.vertices, pair.count, pair.beta,
+        pair.limit * pair.force_ratio * (Mat3::Identity() - pair.normal * pair.normal.transpose()),
+        blocks);
 }
 
 void Contact::add_stiffness(const collision::PairVertices& vertices, int count,

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include <piecework/colliders/collider.hpp>
 #include <piecework/collision/ccd.hpp>
 #include <piecework/collision/surface.hpp>
-#include <piecework/colliders/collider.hpp>
 #include <piecework/contact/activation.hpp>
 #include <piecework/contact/bodies.hpp>
 #include <piecework/contact/near_pairs.hpp>

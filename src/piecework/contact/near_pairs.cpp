@@ -18,7 +18,8 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 /// Distance of the two elements' boxes, m: a cheap lower bound.
 double box_distance(collision::PairKind kind, const collision::PairPoints& x) {
   const bool edges = kind == collision::PairKind::EdgeEdge;
-  const Vec3 low_a = edges ? x[0].cwiseMin(x[1]) : x[0], high_a = edges ? x[0].cwiseMax(x[1]) : x[0];
+  const Vec3 low_a = edges ? x[0].cwiseMin(x[1]) : x[0],
+             high_a = edges ? x[0].cwiseMax(x[1]) : x[0];
   Vec3 low_b = x[2].cwiseMin(x[3]), high_b = x[2].cwiseMax(x[3]);
   if (!edges) {
     low_b = low_b.cwiseMin(x[1]);
@@ -126,7 +127,8 @@ const PairList& NearPairs::near(const Points& x) {
           NearPair pair = all[i];
           const auto& v = pair.vertices;
           if (pair.distance - closing_bound(pair.kind, moved_[at(v[0])], moved_[at(v[1])],
-                                            moved_[at(v[2])], moved_[at(v[3])]) >= within)
+                                            moved_[at(v[2])], moved_[at(v[3])]) >=
+              within)
             continue;
           pair.distance = std::sqrt(collision::closest(pair.kind, x(v)).distance_sq);
           if (pair.distance < within) blocks_[block].push_back(pair);

@@ -37,8 +37,7 @@ bool activate(const NearPair& pair, const Points& x, const Points& rest,
   active.beta = closest.beta;
   active.normal = closest.offset / d;
   Fade fade;
-  if (pair.kind == collision::PairKind::EdgeEdge)
-    fade = parallel_fade(points, rest(pair.vertices));
+  if (pair.kind == collision::PairKind::EdgeEdge) fade = parallel_fade(points, rest(pair.vertices));
   active.energy = fade.value * b.energy;
   active.pressure = -fade.value * b.slope;
   active.curvature = fade.value * b.curvature;

@@ -36,8 +36,8 @@ struct FrictionPair {
   int count;
   std::array<double, 4> beta;
   Vec3 normal;
-  double limit;   ///< mu times the pressure, N
-  Vec3 start;     ///< where the first closest point was relative to the second, m
+  double limit;            ///< mu times the pressure, N
+  Vec3 start;              ///< where the first closest point was relative to the second, m
   double force_ratio = 0;  ///< f1(y) / y where the pair is now, 1/m
 };
 

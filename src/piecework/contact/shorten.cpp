@@ -123,10 +123,11 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
       way_.row(static_cast<Eigen::Index>(v)) =
           (end(static_cast<int>(v)) - from(static_cast<int>(v))).transpose();
     });
-    held_moves_ = parallel_max(at(from.count()), [&](std::size_t v) {
-                    const bool held = is_held(static_cast<int>(v));
-                    return held ? way_.row(static_cast<Eigen::Index>(v)).cwiseAbs().maxCoeff() : 0.0;
-                  }) > 0;
+    held_moves_ =
+        parallel_max(at(from.count()), [&](std::size_t v) {
+          const bool held = is_held(static_cast<int>(v));
+          return held ? way_.row(static_cast<Eigen::Index>(v)).cwiseAbs().maxCoeff() : 0.0;
+        }) > 0;
     scale_.assign(at(from.count()), 1.0);
     changed_.assign(at(from.count()), 0);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
-// What minimisers know of contact: its part of the incremental potential, and how far a step may go.
+// What minimisers know of contact: its part of the incremental potential, and how far a step may
+// go.
 
 #include <array>
 #include <vector>

@@ -25,8 +25,8 @@ int HessianMatrix::entry(int row, int column) const {
   return static_cast<int>(found - system_.innerIndexPtr());
 }
 
-void HessianMatrix::add_pair(const Reduction& reduction, int row_vertex, int column_vertex,
-                             Use use, std::vector<Addition>& additions) const {
+void HessianMatrix::add_pair(const Reduction& reduction, int row_vertex, int column_vertex, Use use,
+                             std::vector<Addition>& additions) const {
   const mesh::SeamMap& seams = model_.sewing.map();
   seams.visit_carriers(column_vertex, [&](int c, double c_weight) {
     seams.visit_carriers(row_vertex, [&](int r, double r_weight) {
@@ -90,8 +90,7 @@ Mat3 HessianMatrix::gathered(std::size_t k) const {
   return block;
 }
 
-void HessianMatrix::assemble(const Positions& x, const StepProblem& problem,
-                             HessianForm form) {
+void HessianMatrix::assemble(const Positions& x, const StepProblem& problem, HessianForm form) {
   parallel_for(stretch_.size(), [&](std::size_t t) {
     const StretchConstraint& c = model_.stretch[t];
     const Mat32 F = deformation_gradient(c, x);
@@ -121,7 +120,8 @@ void HessianMatrix::multiply_rounded(const Positions& x, Positions& y) {
       const float* b = rounded_[static_cast<std::size_t>(k)].data();  // column-major: its transpose
       const double* v = x.data() + 3 * static_cast<std::ptrdiff_t>(row[k]);
       for (int i = 0; i < 3; ++i)
-        sum[i] += double(b[3 * i]) * v[0] + double(b[3 * i + 1]) * v[1] + double(b[3 * i + 2]) * v[2];
+        sum[i] +=
+            double(b[3 * i]) * v[0] + double(b[3 * i + 1]) * v[1] + double(b[3 * i + 2]) * v[2];
     }
     for (int i = 0; i < 3; ++i) y(static_cast<Eigen::Index>(column), i) = sum[i];
   });

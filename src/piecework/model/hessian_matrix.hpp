@@ -74,7 +74,7 @@ class HessianMatrix {
   SparseMatrix system_;
   Uses triangle_uses_, hinge_uses_;
   std::vector<StretchSoftening> stretch_;  ///< per triangle
-  std::vector<Mat3> bend_;                        ///< per curved hinge
+  std::vector<Mat3> bend_;                 ///< per curved hinge
   std::vector<Mat3> blocks_;
   std::vector<Eigen::Matrix3f> rounded_;  ///< of blocks_; empty: not rounded yet
   SparseMatrix scalars_;

@@ -100,7 +100,7 @@ StepReport Integrator::step(State& state) {
   double misc = phase.lap();
 
   StepProblem problem{&predicted_, &fixed, &state.x, extrapolate ? &extrapolated_ : nullptr,
-                      &memory,     {},      nullptr};
+                      &memory,     {},     nullptr};
   if (iteration_observer_)
     problem.observer = [&](const StepReport& report, const Positions& x) {
       return iteration_observer_(state.step + 1, report, x);

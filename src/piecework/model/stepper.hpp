@@ -59,7 +59,7 @@ struct StepReport {
   int normal_factors = 0;  ///< factorisations of the metric's normal part
   int pcg_iterations = 0;  ///< inner iterations of inexact Newton steps
   bool stalled = false;    ///< ended before the stop rule held: rounding allows no more progress
-  int degenerate_projections = 0;  ///< triangles that needed the rank-deficient rule
+  int degenerate_projections = 0;        ///< triangles that needed the rank-deficient rule
   std::optional<ContactReport> contact;  ///< absent: nothing can touch
   PhaseTimes phases;
   double step_ms = 0;
@@ -85,7 +85,7 @@ struct StepProblem {
   const Positions* extrapolated = nullptr;
   /// State::memory, to be read and renewed; null: none is kept.
   std::vector<double>* memory = nullptr;
-  IterationObserver observer;  ///< usually empty
+  IterationObserver observer;       ///< usually empty
   ContactTerms* contact = nullptr;  ///< null: nothing can touch
 
   /// False: the observer has seen enough.

@@ -73,8 +73,7 @@ DdPd::DdPd(const model::ClothModel& model, const DdPdOptions& options,
     : model_(model),
       options_(options),
       convergence_(model, options.gravity, options.stop),
-      metric_(model, assemble_system(model, options.h), std::move(solver),
-              options.contact_solve),
+      metric_(model, assemble_system(model, options.h), std::move(solver), options.contact_solve),
       acceleration_(make_acceleration(options.acceleration)),
       local_(model, options.h),
       domains_(domains) {
@@ -212,8 +211,8 @@ void DdPd::find_moved() {
 }
 
 bool DdPd::wants_newton() const {
-  return options_.newton == NewtonUse::Touching && contact_ && contact_->touching() &&
-         !sweeps_ && !newton_failed_;
+  return options_.newton == NewtonUse::Touching && contact_ && contact_->touching() && !sweeps_ &&
+         !newton_failed_;
 }
 
 bool DdPd::newton_is_outdated() const {
@@ -255,8 +254,7 @@ void DdPd::accept(const Positions& moved, double scale, double step, model::Step
 }
 
 bool DdPd::line_search(const model::StepProblem& problem, double slope, model::StepReport& report) {
-  const bool may_shorten =
-      newton_proposed_ || acceleration_->scalable() || acceleration_->fresh();
+  const bool may_shorten = newton_proposed_ || acceleration_->scalable() || acceleration_->fresh();
   double step = 1;
   for (int k = 0; k < (may_shorten ? kMaxBacktracks : 1); ++k) {
     metric_.reduction().advance(now_.x, step, d_, trial_.x);
@@ -289,7 +287,8 @@ bool DdPd::move(const model::StepProblem& problem, model::StepReport& report) {
   const Stopwatch watch;
   const double others_before = report.phases.local + detection_ms();
   const auto finish = [&](bool moved) {
-    report.phases.global += watch.elapsed_ms() - (report.phases.local + detection_ms() - others_before);
+    report.phases.global +=
+        watch.elapsed_ms() - (report.phases.local + detection_ms() - others_before);
     return moved;
   };
   for (;;) {

@@ -121,8 +121,8 @@ bool Metric::factor_with(const Eigen::VectorXd& D) {
     diagonal_ = global::make_diagonal_solver(contact_solve_.method, contact_solve_.options);
     if (diagonal_->prepare(reduced_, *solver_->tree()) != global::SolveStatus::Ok) return false;
   }
-  contact_in_use_ = diagonal_->update({D.data(), static_cast<std::size_t>(D.size())}) ==
-                    global::SolveStatus::Ok;
+  contact_in_use_ =
+      diagonal_->update({D.data(), static_cast<std::size_t>(D.size())}) == global::SolveStatus::Ok;
   return contact_in_use_;
 }
 

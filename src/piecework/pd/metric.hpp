@@ -86,14 +86,14 @@ class Metric {
   Eigen::VectorXd along_normal_;  ///< N^T g, then Kn^-1 N^T g
 
   // Contact; absent until anything touches.
-  model::ContactStiffness contact_;     ///< per vertex
-  Eigen::VectorXd along_, across_;      ///< per unknown, N/m
-  global::TreeSolver contact_solver_;   ///< of K~ + D
+  model::ContactStiffness contact_;    ///< per vertex
+  Eigen::VectorXd along_, across_;     ///< per unknown, N/m
+  global::TreeSolver contact_solver_;  ///< of K~ + D
   bool contact_analysed_ = false;
   bool contact_in_use_ = false;
   ContactSolve contact_solve_;
   std::unique_ptr<global::DiagonalUpdateSolver> diagonal_;  ///< absent: K~ + D is refactored
-  std::vector<double> contact_values_;  ///< of K~ + D
+  std::vector<double> contact_values_;                      ///< of K~ + D
   Positions vertex_normals_, tangential_;
 };
 

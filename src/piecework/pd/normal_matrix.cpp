@@ -221,8 +221,7 @@ void NormalMatrix::Impl::fill_sewn(const SewnTriangle& s, const Positions& x) {
   }
 }
 
-void NormalMatrix::Impl::gather_column(std::size_t column,
-                                       const Eigen::VectorXd& extra_diagonal) {
+void NormalMatrix::Impl::gather_column(std::size_t column, const Eigen::VectorXd& extra_diagonal) {
   const auto c = static_cast<Eigen::Index>(column);
   const Eigen::RowVector3d n = normals.row(c);
   for (int e = K.outerIndexPtr()[column]; e < K.outerIndexPtr()[column + 1]; ++e) {

@@ -63,7 +63,8 @@ std::string table_one(const RunRecord& record, const World& world) {
       "| PCG | Misc. | Min | Max | Med | Avg |\n"
       "|:--|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
   text += fmt::format(
-      "| {} | {} | {} | {} | {}\\|{}\\|{} | {} | {} | {} | {} | {} | {} | - | - | {} | {} | {} | {} "
+      "| {} | {} | {} | {} | {}\\|{}\\|{} | {} | {} | {} | {} | {} | {} | - | - | {} | {} | {} | "
+      "{} "
       "| {} |\n",
       plain_cell(world.scene.name), s.domains, 3 * world.model.num_vertices(),
       world.model.triangles.size(), s.corner, s.boundary, s.remainder, three_digits(iterations),

@@ -208,9 +208,8 @@ std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
   options.ccd.method =
       scene.quality.ccd == "newton" ? collision::CcdMethod::Newton : collision::CcdMethod::Halley;
   options.check = scene.contact.check;
-  return std::make_unique<contact::Contact>(world.model, options,
-                                            contact::Colliders{world.analytic_colliders,
-                                                               world.mesh_colliders});
+  return std::make_unique<contact::Contact>(
+      world.model, options, contact::Colliders{world.analytic_colliders, world.mesh_colliders});
 }
 
 std::unique_ptr<model::Integrator> make_integrator(const World& world) {

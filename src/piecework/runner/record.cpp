@@ -24,13 +24,11 @@ struct PhaseColumn {
   const char* key;
   double model::PhaseTimes::*member;
 };
-constexpr PhaseColumn kPhases[] = {{"cull", &model::PhaseTimes::cull},
-                                   {"narrow", &model::PhaseTimes::narrow},
-                                   {"local", &model::PhaseTimes::local},
-                                   {"global", &model::PhaseTimes::global},
-                                   {"refactor", &model::PhaseTimes::refactor},
-                                   {"misc", &model::PhaseTimes::misc},
-                                   {"check", &model::PhaseTimes::check}};
+constexpr PhaseColumn kPhases[] = {
+    {"cull", &model::PhaseTimes::cull},         {"narrow", &model::PhaseTimes::narrow},
+    {"local", &model::PhaseTimes::local},       {"global", &model::PhaseTimes::global},
+    {"refactor", &model::PhaseTimes::refactor}, {"misc", &model::PhaseTimes::misc},
+    {"check", &model::PhaseTimes::check}};
 
 struct ContactCounter {
   const char* key;

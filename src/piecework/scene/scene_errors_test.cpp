@@ -158,11 +158,13 @@ TEST(SceneErrors, Keys) {
           {with(R"(@"humidity": 0.4)"),
            "/humidity: unknown key \"humidity\"; known keys here: name, description, step, "
            "gravity, "
-           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, colliders, "
+           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, "
+           "seams, colliders, "
            "camera, render, expect"},
           {with(R"(@"a/b~c": 0.4)"),
            "/a~1b~0c: unknown key \"a/b~c\"; known keys here: name, description, step, gravity, "
-           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, seams, colliders, "
+           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, "
+           "seams, colliders, "
            "camera, render, expect"},
           {R"(@{ "cloths": [] })",
            "/: \"materials\" is missing; add it: materials by name; cloths share them"},

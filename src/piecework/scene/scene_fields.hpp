@@ -457,10 +457,11 @@ void fields(V& v, Contact& c) {
             {"none", "stiffness / 2 (d - x)^2, the paper's: finite at x = 0"}});
   v.value({"slip_speed", "below this speed friction is not yet fully developed", "m/s"},
           c.slip_speed, above(0, 1e3));
-  v.value({"check",
-           "count edges that pass through triangles after every step, by a test that shares nothing "
-           "with what prevents them"},
-          c.check);
+  v.value(
+      {"check",
+       "count edges that pass through triangles after every step, by a test that shares nothing "
+       "with what prevents them"},
+      c.check);
 }
 
 template <class V>

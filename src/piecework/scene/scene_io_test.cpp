@@ -159,11 +159,11 @@ Scene expected_every_key() {
   scene.gravity = {1, 2, 3};
   scene.wind = Wind{{4, 5, 6}, 1.1, 2, 0.5, 0.25, 3};
   scene.damping = 0.125;
-  scene.solver = {"vanilla_pd", "primal_dual", "jacobi", 5, {1, 1, 1, 0.5, 0.25},
-                  0.25,         "dense",       "dual",   "adaptive", 3, "unprojected",
-                  "pcg",        0.75};
-  scene.quality = {"dx_rms", 1e-3, 11, 2, "anderson", 7, "single",
-                   "newton", "never", 3, 0.5, 9, 5, "reference"};
+  scene.solver = {"vanilla_pd",  "primal_dual", "jacobi", 5,          {1, 1, 1, 0.5, 0.25},
+                  0.25,          "dense",       "dual",   "adaptive", 3,
+                  "unprojected", "pcg",         0.75};
+  scene.quality = {"dx_rms", 1e-3,    11, 2,   "anderson", 7, "single",
+                   "newton", "never", 3,  0.5, 9,          5, "reference"};
   scene.self_collision = true, scene.friction = 0.5;
   scene.contact = {0.002, 100, "ipc", 0.01, false};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
