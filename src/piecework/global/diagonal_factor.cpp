@@ -65,7 +65,7 @@ class FactorUpdate : public DiagonalUpdateSolver {
       status = factor_.factor(values_);
     }
     has_factor_ = status == SolveStatus::Ok;
-    report_.refactored_rows += factor_.report().factored_rows;
+    report_.refactored_rows = factor_.report().factored_rows;
     return status;
   }
 

@@ -52,6 +52,7 @@ SolveStatus DiagonalUpdateSolver::update(std::span<const double> diagonal) {
           fmt::format("contact weights: row {} has {}; weights are finite and at least "
                       "0",
                       v, diagonal[v]));
+  report_ = {};
   diagonal_ = Eigen::Map<const Eigen::VectorXd>(diagonal.data(), diagonal_.size());
   inverse_ = (K_->diagonal() + diagonal_).cwiseInverse();
   contacts_.clear();

@@ -77,8 +77,10 @@ enum class DiagonalStatus {
 
 struct DiagonalReport {
   int iterations = 0;
-  int applications = 0;     ///< solves with a factor, three right-hand sides each
-  int refactored_rows = 0;  ///< by update() and since, rows of all fronts that were redone
+  /// Solves with a factor, three right-hand sides each; in the first solve after an update() with
+  /// those that it took.
+  int applications = 0;
+  int refactored_rows = 0;  ///< rows of the fronts that the update() before this solve redid
   /// max_v |b - (K + D) x|_v / (K + D)_vv over max_v |b_v| / (K + D)_vv: both as displacements, so
   /// that stiff contacts weigh as much as cloth. (In the 2-norm of forces they hide an error of
   /// 80 %.) A smooth error is larger than it by up to the condition of the scaled matrix.
