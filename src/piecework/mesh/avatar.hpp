@@ -77,7 +77,8 @@ class Avatar {
 /// \throws InputError that names file, item and remedy: as import_mesh() for the file itself; no
 ///         triangles (a file with motion only); an unknown clip, or several and none is named (the
 ///         text lists them); start_time after its end; key times that do not increase; rotations
-///         that are no quaternion; bind matrices that are singular; numbers that are not finite
+///         that are no quaternion; bind matrices that are singular; numbers that are not finite;
+///         joints of which two have one name
 Avatar import_avatar(const std::filesystem::path& path, const AvatarOptions& options);
 
 }  // namespace piecework::mesh

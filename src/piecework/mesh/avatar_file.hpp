@@ -48,7 +48,8 @@ struct AvatarFile {
 
 /// Reads a figure and one of its clips in a child process. \param clip  empty: the only one, if any
 /// \throws InputError as import_mesh(); if there is no such clip, or several and none is named; if
-///         there are no triangles, indices are out of range, or joints and tracks name no node
+///         there are no triangles, indices are out of range, or joints and tracks name no
+///         node, or several
 AvatarFile read_avatar_file(const std::filesystem::path& path, const std::string& extension,
                             const std::string& clip, std::size_t max_triangles);
 

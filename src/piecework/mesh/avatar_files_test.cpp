@@ -117,6 +117,16 @@ TEST(AvatarFiles, EveryBadFigureMovesOrSaysWhyNot) {
   EXPECT_EQ(seen, static_cast<int>(outcomes.size()));
 }
 
+// Eight of its joints have the name of a part: with the parts in their place it is 3.1 high.
+TEST(AvatarFiles, TheRobotStandsUpright) {
+  const fs::path path = data("avatars") / "quaternius_robot.glb";
+  if (!fs::exists(path)) GTEST_SKIP() << path.string() << " is absent";
+  Positions x;
+  import_avatar(path, {.clip = "Robot_Dance"}).bind_pose(x);
+  EXPECT_NEAR(x.col(1).minCoeff(), 0, 0.05);
+  EXPECT_NEAR(x.col(1).maxCoeff(), 4.5, 0.05);
+}
+
 TEST(AvatarFiles, ClipsStartInTheBindPose) {
   const fs::path path = data("avatars") / "mh_female.glb";
   if (!fs::exists(path)) GTEST_SKIP() << path.string() << " is absent";

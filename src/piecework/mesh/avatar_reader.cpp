@@ -61,6 +61,10 @@ class AvatarCollector {
   }
 
  private:
+  struct Named {
+    int number;
+    bool has_mesh;
+  };
   struct Placed {
     const aiMesh* mesh;
     int number, first_vertex;
@@ -75,7 +79,7 @@ class AvatarCollector {
     std::string name = node.mName.C_Str();
     for (char& c : name)
       if (c == '\n') c = ' ';
-    nodes_.try_emplace(node.mName.C_Str(), number);  // of equal names the first one counts
+    nodes_[node.mName.C_Str()].push_back({number, node.mNumMeshes > 0});
     out_.node_names += name + '\n';
     out_.node_parent.push_back(parent);
     add_matrix(node.mTransformation, out_.node_local);
@@ -115,15 +119,27 @@ class AvatarCollector {
     }
   }
 
+  /// assimp knows joints and animated nodes by name only, though names need not be unique: a joint
+  /// and the part on it are often called alike. Then the joint is meant, which carries no mesh.
+  [[nodiscard]] int node_named(const char* name, const char* who) const {
+    const auto found = nodes_.find(name);
+    if (found == nodes_.end())
+      fail(fmt::format("{} names '{}', which is no node", who, name), kExportAgain);
+    std::vector<Named> bare;
+    for (const Named& node : found->second)
+      if (!node.has_mesh) bare.push_back(node);
+    const std::vector<Named>& candidates = bare.empty() ? found->second : bare;
+    if (candidates.size() > 1)
+      fail(fmt::format("{} names '{}', but {} nodes have that name", who, name, candidates.size()),
+           "give each its own");
+    return candidates.front().number;
+  }
+
   void add_joints(const Placed& placed) {
     for (unsigned b = 0; b < placed.mesh->mNumBones; ++b) {
       const aiBone& bone = *placed.mesh->mBones[b];
-      const auto node = nodes_.find(bone.mName.C_Str());
-      if (node == nodes_.end())
-        fail(fmt::format("joint '{}' of mesh {} is no node", bone.mName.C_Str(), placed.number),
-             kExportAgain);
       const int joint = static_cast<int>(out_.joint_node.size());
-      out_.joint_node.push_back(node->second);
+      out_.joint_node.push_back(node_named(bone.mName.C_Str(), "a joint"));
       out_.joint_mesh.push_back(placed.number);
       add_matrix(bone.mOffsetMatrix, out_.joint_offset);
       for (unsigned w = 0; w < bone.mNumWeights; ++w) {
@@ -157,12 +173,7 @@ class AvatarCollector {
     for (AvatarKeys* keys : {&out_.moves, &out_.turns, &out_.scales}) keys->begin.push_back(0);
     for (unsigned c = 0; c < clip.mNumChannels; ++c) {
       const aiNodeAnim& channel = *clip.mChannels[c];
-      const auto node = nodes_.find(channel.mNodeName.C_Str());
-      if (node == nodes_.end())
-        fail(fmt::format("clip \"{}\" moves '{}', which is no node", out_.clip,
-                         channel.mNodeName.C_Str()),
-             kExportAgain);
-      out_.track_node.push_back(node->second);
+      out_.track_node.push_back(node_named(channel.mNodeName.C_Str(), "the clip"));
       add_keys(channel.mPositionKeys, channel.mNumPositionKeys, ticks, out_.moves);
       add_keys(channel.mRotationKeys, channel.mNumRotationKeys, ticks, out_.turns);
       add_keys(channel.mScalingKeys, channel.mNumScalingKeys, ticks, out_.scales);
@@ -191,7 +202,7 @@ class AvatarCollector {
   const aiScene& scene_;
   SizeGuard guard_;
   AvatarFile out_;
-  std::map<std::string, int> nodes_;
+  std::map<std::string, std::vector<Named>> nodes_;
   std::vector<Placed> placed_;
 };
 

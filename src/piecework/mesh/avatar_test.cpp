@@ -183,6 +183,18 @@ TEST_F(AvatarTest, ClipsByName) {
             std::string::npos);
 }
 
+TEST_F(AvatarTest, AJointAndThePartOnItMayBeCalledAlike) {
+  StripFigure alike;
+  alike.body = "knee";
+  Positions x, expected;
+  load(alike).positions_at(1.2, x);
+  load({}).positions_at(1.2, expected);
+  EXPECT_TRUE(x == expected);
+  alike.body = "body";
+  alike.hip = "knee";
+  EXPECT_TRUE(contains(error(alike), "a joint names 'knee', but 2 nodes have that name"));
+}
+
 TEST_F(AvatarTest, RefusesWhatCannotBeMoved) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const auto with = [&](const auto& change) {

@@ -60,6 +60,7 @@ struct StripFigure {
   std::vector<float> moves{0, 0, 0, 0, 0, 3};
   std::vector<float> turn_times{0.5F, 1.5F};
   std::vector<float> turns{0, 0, 0, 1, 0, 0, 1, 0};  // x, y, z, w: half a turn about z
+  std::string body = "body", hip = "hip";            ///< names of nodes
   std::string second_clip;                           ///< name of an empty clip beside "bend"
   bool figure = true;                                ///< false: motion only
   bool clips = true;
@@ -93,11 +94,11 @@ struct StripFigure {
           second_clip, mt, m);
     return fmt::format(
         R"({{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0, 1]}}],
-            "nodes": [{{{}"name": "body"}}, {{"name": "hip", "children": [2]}},
+            "nodes": [{{{}"name": "{}"}}, {{"name": "{}", "children": [2]}},
               {{"name": "knee", "translation": [0, 1, 0], "children": [3]}},
               {{{}"name": "badge", "translation": [0, 0.5, 0]}}],
             {}{}{}}})",
-        skin, rigid, figure ? meshes : "",
+        skin, body, hip, rigid, figure ? meshes : "",
         clips ? fmt::format(R"("animations": [{}], )", animations) : "", buffer.json("figure.bin"));
   }
 };
