@@ -9,6 +9,7 @@
 
 #include <piecework/model/measures.hpp>
 #include <piecework/runner/expectation.hpp>
+#include <piecework/runner/methods.hpp>
 #include <piecework/runner/world.hpp>
 #include <piecework/scene/scene_io.hpp>
 
@@ -24,7 +25,7 @@ constexpr const char* kExamples =
     "  piecework check hanging_tablecloth --set solver.domains=64";
 
 void print_feature(const char* name, bool on, const std::string& why) {
-  fmt::print("  {:<12} {:<4} {}\n", name, on ? "on" : "-", why);
+  fmt::print("  {:<14} {:<4} {}\n", name, on ? "on" : "-", why);
 }
 
 void print_features(const runner::World& world) {
@@ -51,6 +52,18 @@ void print_features(const runner::World& world) {
   print_feature("wind", world.forces.wind.has_value(),
                 world.forces.wind ? fmt::format("{:g} m/s", world.forces.wind->velocity.norm())
                                   : "the scene names no `wind`");
+  print_feature("self-collision", scene.self_collision,
+                scene.self_collision ? "cloth touches cloth" : "the scene does not ask for it");
+  print_feature("colliders", !scene.colliders.empty(),
+                scene.colliders.empty() ? "the scene names no `colliders`"
+                                        : fmt::format("{} bodies", scene.colliders.size()));
+  if (scene.self_collision || !scene.colliders.empty()) {
+    print_feature("contact", true,
+                  fmt::format("from {:.3g} mm on", 1e3 * runner::contact_distance(world)));
+    print_feature("friction", scene.friction.has_value(),
+                  scene.friction ? fmt::format("coefficient {:g}", *scene.friction)
+                                 : "the scene names no `friction`");
+  }
   print_feature(
       "damping", scene.damping.has_value(),
       scene.damping ? fmt::format("{:g} 1/s", *scene.damping) : "the scene names no `damping`");

@@ -309,8 +309,7 @@ bool DdPd::move(const model::StepProblem& problem, model::StepReport& report) {
   }
 }
 
-model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x) {
-  model::StepReport report;
+void DdPd::begin_step(const model::StepProblem& problem, model::StepReport& report) {
   report.phases.local = report.phases.global = 0;
   if (fixed_ != *problem.fixed) {
     const Stopwatch watch;
@@ -323,13 +322,31 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
   contact_ = problem.contact;
   newton_proposed_ = newton_failed_ = false;
   if (newton_) newton_->begin();
-  int renewals = options_.friction_renewals;
+  renewals_left_ = options_.friction_renewals;
+  without_progress_ = 0;
+}
+
+/// Whether the iterate ends the step, and whether anything is still to be had.
+void DdPd::judge(const model::StepProblem& problem, model::StepReport& report) {
+  report.converged = convergence_.reached(report) && believable(report);
+  if (report.converged && contact_ && contact_->report().held_back > 0) report.converged = false;
+  if (report.converged && renewals_left_-- > 0 && renew_friction(problem, report))
+    report.converged = false;
+  if (report.gradient < kProgress * best_gradient_) {
+    best_gradient_ = report.gradient;
+    without_progress_ = 0;
+  }
+  report.stalled = !report.converged && ++without_progress_ > kPatience;
+}
+
+model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x) {
+  model::StepReport report;
+  begin_step(problem, report);
   choose_start(problem, x, report);
   convergence_.measure_gradient(now_.g, report);
+  best_gradient_ = report.gradient;
   report.energy = now_.energy;
   bool go_on = problem.observe(report, now_.x);
-  without_progress_ = 0;
-  double best_gradient = report.gradient;
   while (go_on && report.iterations < options_.stop.max_iterations && !report.converged &&
          !report.stalled) {
     advance_held(problem, report);
@@ -342,16 +359,9 @@ model::StepReport DdPd::minimize(const model::StepProblem& problem, Positions& x
     }
     ++report.iterations;
     convergence_.measure_gradient(now_.g, report);
-    if (report.gradient < kProgress * best_gradient) {
-      best_gradient = report.gradient;
-      without_progress_ = 0;
-    }
     report.energy = now_.energy;
     go_on = problem.observe(report, now_.x);
-    report.converged = convergence_.reached(report) && believable(report);
-    if (report.converged && renewals-- > 0 && renew_friction(problem, report))
-      report.converged = false;
-    report.stalled = !report.converged && ++without_progress_ > kPatience;
+    judge(problem, report);
   }
   report.degenerate_projections = now_.degenerate;
   if (options_.normals == NormalPart::Automatic && problem.memory)

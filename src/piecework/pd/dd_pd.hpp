@@ -73,6 +73,8 @@ class DdPd final : public model::Minimizer {
     int degenerate = 0;
   };
 
+  void begin_step(const model::StepProblem& problem, model::StepReport& report);
+  void judge(const model::StepProblem& problem, model::StepReport& report);
   /// Sweeps x first, if that is wanted.
   void evaluate(Point& point, const model::StepProblem& problem, model::StepReport& report);
   void choose_start(const model::StepProblem& problem, const Positions& predicted,
@@ -116,6 +118,8 @@ class DdPd final : public model::Minimizer {
   int last_refresh_ = 0;  ///< iteration of the step
   double gradient_at_refresh_ = 0;
   int without_progress_ = 0;  ///< iterations
+  double best_gradient_ = 0;  ///< of the step
+  int renewals_left_ = 0;     ///< of friction
   Point now_, trial_;
   Positions gradient_;  ///< |V| x 3
   Positions d_;         ///< n_f x 3

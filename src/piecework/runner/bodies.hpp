@@ -11,4 +11,8 @@ namespace piecework::runner {
 /// \throws InputError that names scene, JSON pointer or file, and remedy
 void add_colliders(World& world);
 
+/// Notes what passes through what at the start, if the scene lets anything touch: no step will pull
+/// it apart. \pre colliders are added
+void note_start_intersections(World& world);
+
 }  // namespace piecework::runner

@@ -149,18 +149,6 @@ contact::Barrier barrier(const std::string& name) {
   return contact::Barrier::TwoStage;
 }
 
-/// \throws InputError if the mesh is too coarse a thing for it: neighbours would touch.
-double contact_distance(const World& world) {
-  const double mean_edge = world.model.mean_edge;
-  if (!world.scene.contact.distance) return std::min(1e-3, 0.25 * mean_edge);
-  const double distance = *world.scene.contact.distance;
-  if (distance <= 0.5 * mean_edge) return distance;
-  throw InputError(fmt::format(
-      "{}: /contact/distance: {:g} m is more than half of the mean edge length, {:g} m: neighbours "
-      "would touch each other; take less, or a coarser mesh",
-      world.scene.source, distance, mean_edge));
-}
-
 }  // namespace
 
 std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
@@ -190,6 +178,17 @@ std::unique_ptr<model::Minimizer> make_minimizer(const World& world) {
   if (method == "pd_jacobi") return make_pd_jacobi(context);
   if (method == "xpbd") return make_xpbd(context);
   return make_dd_pd(context);
+}
+
+double contact_distance(const World& world) {
+  const double mean_edge = world.model.mean_edge;
+  if (!world.scene.contact.distance) return std::min(1e-3, 0.25 * mean_edge);
+  const double distance = *world.scene.contact.distance;
+  if (distance <= 0.5 * mean_edge) return distance;
+  throw InputError(fmt::format(
+      "{}: /contact/distance: {:g} m is more than half of the mean edge length, {:g} m: neighbours "
+      "would touch each other; take less, or a coarser mesh",
+      world.scene.source, distance, mean_edge));
 }
 
 std::unique_ptr<model::ContactTerms> make_contact(const World& world) {

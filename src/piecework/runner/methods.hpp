@@ -16,6 +16,10 @@ std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world);
 /// The method that the scene asks for. \pre `world` outlives it.
 std::unique_ptr<model::Minimizer> make_minimizer(const World& world);
 
+/// Distance at which contact begins, m: the scene's, or one that suits the mesh.
+/// \throws InputError if the mesh is too fine for it: neighbours would touch.
+double contact_distance(const World& world);
+
 /// What the scene lets touch, or null. \pre `world` outlives it.
 std::unique_ptr<model::ContactTerms> make_contact(const World& world);
 

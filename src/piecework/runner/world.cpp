@@ -226,6 +226,7 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
     add_pins_and_loads(*world, i, fmt::format("{}: /cloths/{}", scene.source, i));
   hold_seams(*world);
   add_colliders(*world);
+  note_start_intersections(*world);
   world->load_ms = watch.lap();
 
   world->domains = decomposition::decompose(
