@@ -127,6 +127,9 @@ void add_colliders(World& world) {
       note(world.analytic_colliders.back());
       continue;
     }
+    if (collider.avatar)
+      require_file(collider.avatar->file, world.scene.source,
+                   fmt::format("/colliders/{}/avatar/file", i));
     Body body = body_of(collider);
     for (const std::string& line : body.notes)
       world.notes.push_back(fmt::format("collider {}: {}", collider.name, line));

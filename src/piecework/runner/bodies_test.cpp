@@ -128,7 +128,8 @@ TEST(Bodies, RefusalsSayWhereAndWhatToDo) {
                 .find("t.json: /colliders/0: b: rounding is 0.75 m"),
             std::string::npos);
   EXPECT_NE(refused(R"({"shape": "mesh", "avatar": {"file": "/nowhere/a.glb"}})")
-                .find("/nowhere/a.glb: file not found"),
+                .find("t.json: /colliders/0/avatar/file: /nowhere/a.glb: file not found; correct "
+                      "the path, or name another: --set /colliders/0/avatar/file="),
             std::string::npos);
   EXPECT_NE(refused(R"({"shape": "mesh", "sequence": {"pattern": "/nowhere/a.obj", "last": 3}})")
                 .find("no single place for the number"),

@@ -138,7 +138,10 @@ void add_fields(World& world) {
                                   .gust_period = wind.gust_period};
 }
 
-model::ClothPart make_part(World& world, const scene::Cloth& cloth, const std::string& where) {
+model::ClothPart make_part(World& world, const scene::Cloth& cloth, const std::string& pointer) {
+  if (cloth.mesh.generator.empty())
+    require_file(cloth.mesh.file, world.scene.source, pointer + "/mesh/file");
+  const std::string where = fmt::format("{}: {}", world.scene.source, pointer);
   mesh::MeshDocument document = load_mesh(cloth.mesh);
   for (const std::string& note : document.notes)
     world.notes.push_back(fmt::format("{}: {}", cloth.name, note));
@@ -217,8 +220,7 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
   world->scene = scene;
   std::vector<model::ClothPart> parts;
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
-    parts.push_back(
-        make_part(*world, scene.cloths[i], fmt::format("{}: /cloths/{}", scene.source, i)));
+    parts.push_back(make_part(*world, scene.cloths[i], fmt::format("/cloths/{}", i)));
   world->model = model::build_model(parts);
   sew(*world);
   add_fields(*world);
