@@ -55,8 +55,10 @@ void print_features(const runner::World& world) {
   print_feature("self-collision", scene.self_collision,
                 scene.self_collision ? "cloth touches cloth" : "the scene does not ask for it");
   print_feature("colliders", !scene.colliders.empty(),
-                scene.colliders.empty() ? "the scene names no `colliders`"
-                                        : fmt::format("{} bodies", scene.colliders.size()));
+                scene.colliders.empty()
+                    ? "the scene names no `colliders`"
+                    : fmt::format("{} {}", scene.colliders.size(),
+                                  scene.colliders.size() == 1 ? "body" : "bodies"));
   if (scene.self_collision || !scene.colliders.empty()) {
     print_feature("contact", true,
                   fmt::format("from {:.3g} mm on", 1e3 * runner::contact_distance(world)));

@@ -1,7 +1,8 @@
-// A start that moving obstacles do not run into.
+// A way on which what is held and moves does not run into cloth: it takes along what is near.
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <piecework/contact/contact.hpp>
 #include <piecework/core/clock.hpp>
@@ -11,49 +12,71 @@
 namespace piecework::contact {
 namespace {
 
+/// Of the gap, how much a vertex may close by itself.
+constexpr double kApproach = 0.5;
+
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// The pair of each cloth vertex with the nearest obstacle triangle; -1: none is a candidate.
-std::vector<int> nearest_triangles(const std::vector<NearPair>& pairs, int num_cloth_vertices) {
-  std::vector<int> nearest(at(num_cloth_vertices), -1);
+/// The vertices of a pair's first element come first, so many.
+std::size_t first_size(const NearPair& pair) {
+  return pair.kind == collision::PairKind::VertexTriangle ? 1 : 2;
+}
+
+}  // namespace
+
+/// 0 or 1: that element of the pair is held, and the other is not; -1: neither is so.
+int Contact::held_element(const NearPair& pair) const {
+  const std::size_t first = first_size(pair);
+  int held[2] = {0, 0};
+  for (std::size_t k = 0; k < 4; ++k) held[k < first ? 0 : 1] += is_held(pair.vertices[k]);
+  const bool all_first = held[0] == static_cast<int>(first);
+  const bool all_second = held[1] == static_cast<int>(4 - first);
+  if (all_first == all_second) return -1;
+  return all_first ? 0 : 1;
+}
+
+std::vector<int> Contact::nearest_held(const std::vector<NearPair>& pairs, const Points& x) const {
+  std::vector<int> nearest(at(model_.num_vertices()), -1);
+  std::vector<double> nearest_sq(nearest.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const NearPair& pair = pairs[i];
-    const bool of_cloth_and_obstacle = pair.kind == collision::PairKind::VertexTriangle &&
-                                       pair.vertices[0] < num_cloth_vertices &&
-                                       pair.vertices[1] >= num_cloth_vertices;
-    if (!of_cloth_and_obstacle) continue;
-    int& best = nearest[at(pair.vertices[0])];
-    if (best < 0 || pair.distance < pairs[at(best)].distance) best = static_cast<int>(i);
+    const int held = held_element(pairs[i]);
+    if (held < 0) continue;
+    const double distance_sq = collision::closest(pairs[i].kind, x(pairs[i].vertices)).distance_sq;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const int v = pairs[i].vertices[k];
+      if ((k < first_size(pairs[i]) ? 0 : 1) == held || is_held(v)) continue;
+      if (!(distance_sq < nearest_sq[at(v)])) continue;
+      nearest_sq[at(v)] = distance_sq;
+      nearest[at(v)] = static_cast<int>(i);
+    }
   }
   return nearest;
 }
 
-/// Of the gap, how much a vertex may close by itself.
-constexpr double kApproach = 0.5;
-
-}  // namespace
-
-void Contact::carry(Positions& x) {
+void Contact::carry(const Points& from, Positions& x, const Positions& obstacles) {
   const Stopwatch watch;
-  const Points from{*problem_->previous, obstacle_begin_}, to{x, obstacle_end_};
+  const Points to{x, obstacles};
   near_.cover(from, to);
   const std::vector<NearPair>& pairs = near_.candidates().pairs;
-  const std::vector<int> nearest = nearest_triangles(pairs, model_.num_vertices());
+  const std::vector<int> nearest = nearest_held(pairs, from);
   parallel_for(nearest.size(), [&](std::size_t v) {
-    if (nearest[v] < 0 || is_held(static_cast<int>(v))) return;
+    if (nearest[v] < 0) return;
     const auto row = static_cast<Eigen::Index>(v);
-    const auto& vertices = pairs[at(nearest[v])].vertices;
-    const collision::Closest closest = collision::closest_vertex_triangle(from(vertices));
+    const NearPair& pair = pairs[at(nearest[v])];
+    const collision::Closest closest = collision::closest(pair.kind, from(pair.vertices));
     const double gap = std::sqrt(closest.distance_sq);
     if (!(gap > 0)) return;
+    const int held = held_element(pair);
     Vec3 carried = Vec3::Zero();
-    for (std::size_t k = 1; k < 4; ++k)
-      carried -= closest.beta[k] * (to(vertices[k]) - from(vertices[k]));
-    const Vec3 normal = closest.offset / gap;
+    for (std::size_t k = 0; k < 4; ++k)
+      if ((k < first_size(pair) ? 0 : 1) == held)
+        carried += std::abs(closest.beta[k]) * (to(pair.vertices[k]) - from(pair.vertices[k]));
+    const Vec3 normal = (held == 0 ? -1 : 1) * closest.offset / gap;
     const Vec3 relative = x.row(row).transpose() - from(static_cast<int>(v)) - carried;
     const double too_close = -relative.dot(normal) - kApproach * gap;
     if (too_close > 0) x.row(row) += too_close * normal.transpose();
   });
+  model_.sewing.follow(end_time_, x);
   report_.narrow_ms += watch.elapsed_ms();
 }
 

@@ -14,6 +14,8 @@ namespace piecework::contact {
 namespace {
 
 constexpr std::size_t kPairsPerBlock = 1024;
+/// Of what is left of their way: pins and obstacles that can go no farther wait for the cloth.
+constexpr double kWorthMoving = 0.05;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -116,7 +118,8 @@ bool Contact::is_held(int v) const {
   return v >= model_.num_vertices() || (*problem_->fixed)[at(v)] != 0;
 }
 
-void Contact::begin_step(const model::StepProblem& problem, double begin, double end) {
+void Contact::begin_step(const model::StepProblem& problem, double begin, double end,
+                         const Positions& obstacles) {
   problem_ = &problem;
   end_time_ = end;
   report_ = {};
@@ -125,10 +128,12 @@ void Contact::begin_step(const model::StepProblem& problem, double begin, double
   near_.begin();
   bodies_.begin_step(begin, end);
   listed_ = -1;
-  if (obstacle_begin_.rows() == 0 || !obstacles_.are_static()) {
+  if (obstacle_begin_.rows() == 0 || lags_ || !obstacles_.are_static()) {
     obstacles_.place(begin, obstacle_begin_);
     obstacles_.place(end, obstacle_end_);
   }
+  lags_ = obstacles.rows() > 0;
+  if (lags_) obstacle_begin_ = obstacles;
   hold_at(0);
   if (!has_friction_) return;
   // Pressure as the step before left it: what touches only now slides freely until it is renewed.
@@ -144,9 +149,18 @@ void Contact::hold_at(double fraction) {
   between(obstacle_begin_, obstacle_end_, fraction, obstacle_now_);
 }
 
+bool Contact::held_moves(const Positions& x) const {
+  if (!obstacles_.are_static()) return true;
+  return parallel_max(at(model_.num_vertices()), [&](std::size_t v) {
+           const auto row = static_cast<Eigen::Index>(v);
+           const bool moves = (*problem_->fixed)[v] && x.row(row) != problem_->previous->row(row);
+           return moves ? 1.0 : 0.0;
+         }) > 0;
+}
+
 double Contact::start(Positions& x) {
   bodies_.start(*problem_->previous, *problem_->fixed, x);
-  if (!obstacles_.are_static()) carry(x);
+  if (held_moves(x)) carry({*problem_->previous, obstacle_begin_}, x, obstacle_end_);
   between(obstacle_begin_, obstacle_end_, 1, obstacle_now_);
   fraction_ = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
   report_.held_back = 1 - fraction_;
@@ -161,8 +175,9 @@ bool Contact::advance_held(Positions& x) {
     if ((*problem_->fixed)[v]) to.row(row) = problem_->predicted->row(row);
   });
   const Positions from = obstacle_now_;
+  carry({x, from}, to, obstacles);
   const double part = shorten({x, from}, to, obstacles);
-  if (!(part > 0)) return false;
+  if (part < kWorthMoving) return false;  // or the gap would shrink to nothing, bit by bit
   fraction_ = part == 1 ? 1 : fraction_ + part * (1 - fraction_);
   report_.held_back = 1 - fraction_;
   std::swap(x, to);
@@ -321,6 +336,11 @@ void Contact::stiffness(const Positions& normals, model::ContactStiffness& stiff
   for (const FrictionPair& p : sliding_)
     add_stiffness(p.vertices, p.count, p.beta, p.normal, 0, p.limit * p.force_ratio, normals,
                   stiffness);
+}
+
+Positions Contact::lagging_obstacles() const {
+  return fraction_ < 1 && obstacle_now_.rows() > 0 && !obstacles_.are_static() ? obstacle_now_
+                                                                               : Positions();
 }
 
 void Contact::end_step(const Positions& x) {

@@ -65,7 +65,8 @@ class Contact final : public model::ContactTerms {
   /// \param model, colliders  must outlive this object
   Contact(const model::ClothModel& model, ContactOptions options, const Colliders& colliders);
 
-  void begin_step(const model::StepProblem& problem, double begin, double end) override;
+  void begin_step(const model::StepProblem& problem, double begin, double end,
+                  const Positions& obstacles) override;
   double start(Positions& x) override;
   void hold_at(double fraction) override;
   bool advance_held(Positions& x) override;
@@ -77,6 +78,7 @@ class Contact final : public model::ContactTerms {
   /// What touches, in the last evaluate().
   [[nodiscard]] std::span<const ActivePair> active() const { return active_; }
   [[nodiscard]] bool touching() const override { return !active_.empty(); }
+  [[nodiscard]] Positions lagging_obstacles() const override;
   void end_step(const Positions& x) override;
   [[nodiscard]] const model::ContactReport& report() const override { return report_; }
 
@@ -95,8 +97,15 @@ class Contact final : public model::ContactTerms {
   void take_scales();
   void lower_scale(int vertex, double scale);
   void go(const Points& from, Positions& to, Positions& obstacles);
-  /// Takes vertices in x along with the moving obstacles that they are near.
-  void carry(Positions& x);
+  /// Takes vertices in x along with what is held, moves, and is near them; `obstacles` are at the
+  /// end of the way.
+  void carry(const Points& from, Positions& x, const Positions& obstacles);
+  [[nodiscard]] int held_element(const NearPair& pair) const;
+  /// For each vertex of cloth the candidate pair with the nearest held element, or -1.
+  [[nodiscard]] std::vector<int> nearest_held(const std::vector<NearPair>& pairs,
+                                              const Points& x) const;
+  /// Pins or obstacles move in this step.
+  [[nodiscard]] bool held_moves(const Positions& x) const;
   [[nodiscard]] bool is_held(int v) const;
   void find_active(const Positions& x);
   void find_active_pairs(std::span<const NearPair> pairs, const Points& points);
@@ -129,6 +138,7 @@ class Contact final : public model::ContactTerms {
   const model::StepProblem* problem_ = nullptr;
   double end_time_ = 0;
   Positions obstacle_begin_, obstacle_end_, obstacle_now_;
+  bool lags_ = false;    ///< obstacles were not where they belong when it began
   double fraction_ = 1;  ///< of the way of what is held
   model::ContactReport report_;
 

@@ -47,8 +47,10 @@ class ContactTerms {
  public:
   virtual ~ContactTerms() = default;
 
-  /// A step from *problem.previous at time `begin` to `end`, s. \pre outlives the step
-  virtual void begin_step(const StepProblem& problem, double begin, double end) = 0;
+  /// A step from *problem.previous at time `begin` to `end`, s. \pre problem outlives the step
+  /// \param obstacles  where they are at its begin if they lag behind, State::obstacles
+  virtual void begin_step(const StepProblem& problem, double begin, double end,
+                          const Positions& obstacles) = 0;
 
   /// Shortens the straight way from the start of the step to x, vertex by vertex, so that nothing
   /// passes through anything; pins and obstacles move along. Returns the fraction of their way that
@@ -81,6 +83,9 @@ class ContactTerms {
 
   /// Anything is closer than the contact distance, in the last evaluate().
   [[nodiscard]] virtual bool touching() const = 0;
+
+  /// Where obstacles have come to, if that is not where they belong; else empty. |O| x 3, m
+  [[nodiscard]] virtual Positions lagging_obstacles() const = 0;
 
   /// Counts what passes through what at the end of the step, x.
   virtual void end_step(const Positions& x) = 0;

@@ -106,7 +106,7 @@ StepReport Integrator::step(State& state) {
       return iteration_observer_(state.step + 1, report, x);
     };
   problem.contact = contact_.get();
-  if (contact_) contact_->begin_step(problem, state.time, end);
+  if (contact_) contact_->begin_step(problem, state.time, end, state.obstacles);
   if (observer_) observer_(problem);
   StepReport report = minimizer_->minimize(problem, x_);
 
@@ -118,7 +118,10 @@ StepReport Integrator::step(State& state) {
                     state.step + 1, report.energy));
   model_.sewing.follow(end, x_);  // to the last bit
   misc += phase.lap();
-  if (contact_) finish_contact(report);
+  if (contact_) {
+    finish_contact(report);
+    state.obstacles = contact_->lagging_obstacles();
+  }
   phase.lap();
   if (minimizer_->wants_extrapolation()) state.previous_v = state.v;
   state.memory = std::move(memory);

@@ -20,6 +20,8 @@ struct State {
   int step = 0;     ///< steps done
   /// Velocities of the step before, m/s, for minimisers that extrapolate; else empty.
   Positions previous_v;
+  /// Where obstacles are, |O| x 3, m, if cloth has kept them from where they belong; else empty.
+  Positions obstacles;
   /// What the minimiser remembers between steps, in its own terms; often empty.
   std::vector<double> memory;
 };

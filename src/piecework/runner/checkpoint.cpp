@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 static_assert(std::endian::native == std::endian::little, "the format is little-endian");
 
-constexpr char kMagic[8] = {'P', 'W', 'S', 'T', 'A', 'T', 'E', '2'};
+constexpr char kMagic[8] = {'P', 'W', 'S', 'T', 'A', 'T', 'E', '3'};
 
 /// Fixed header; x, v, what the next step looks back on, and a checksum of everything before it
 /// follow.
@@ -29,10 +29,11 @@ struct Header {
   std::int64_t step;
   double time;
   std::int64_t vertices;
-  std::int64_t previous;  ///< rows of previous_v: vertices, or 0
-  std::int64_t memory;    ///< numbers
+  std::int64_t previous;   ///< rows of previous_v: vertices, or 0
+  std::int64_t memory;     ///< numbers
+  std::int64_t obstacles;  ///< rows of State::obstacles, or 0
 };
-static_assert(sizeof(Header) == 64);
+static_assert(sizeof(Header) == 72);
 
 std::size_t position_bytes(std::int64_t rows) {
   return static_cast<std::size_t>(rows) * 3 * sizeof(double);
@@ -41,6 +42,7 @@ std::size_t position_bytes(std::int64_t rows) {
 /// Without header and checksum.
 std::size_t body_bytes(const Header& header) {
   return 2 * position_bytes(header.vertices) + position_bytes(header.previous) +
+         position_bytes(header.obstacles) +
          static_cast<std::size_t>(header.memory) * sizeof(double);
 }
 
@@ -48,6 +50,7 @@ std::size_t body_bytes(const Header& header) {
 bool is_plausible(const Header& header, std::size_t file_size) {
   const auto limit = static_cast<std::int64_t>(file_size);
   return header.vertices <= limit && header.memory >= 0 && header.memory <= limit &&
+         header.obstacles >= 0 && header.obstacles <= limit &&
          (header.previous == 0 || header.previous == header.vertices);
 }
 
@@ -118,6 +121,7 @@ void write_state(const fs::path& path, const model::State& state, const std::str
   header.vertices = state.x.rows();
   header.previous = state.previous_v.rows();
   header.memory = std::ssize(state.memory);
+  header.obstacles = state.obstacles.rows();
   std::string content;
   content.reserve(sizeof header + body_bytes(header));
   const auto add = [&](const void* data, std::size_t bytes) {
@@ -128,6 +132,7 @@ void write_state(const fs::path& path, const model::State& state, const std::str
   add(state.v.data(), position_bytes(header.vertices));
   add(state.previous_v.data(), position_bytes(header.previous));
   add(state.memory.data(), state.memory.size() * sizeof(double));
+  add(state.obstacles.data(), position_bytes(header.obstacles));
   content += Hash().add(content).hex();
   write_file_atomically(path, content);
 }
@@ -172,6 +177,7 @@ model::State read_state(const fs::path& path, const std::string& hash, int num_v
   take_positions(state.previous_v, header.previous);
   state.memory.resize(static_cast<std::size_t>(header.memory));
   if (header.memory > 0) take(state.memory.data(), state.memory.size() * sizeof(double));
+  take_positions(state.obstacles, header.obstacles);
   return state;
 }
 

@@ -53,10 +53,12 @@ TEST_F(Checkpoint, KeepsWhatTheNextStepLooksBackOn) {
   model::State state = some_state();
   state.previous_v = testing::random_positions(17, 1, 3);
   state.memory = {4, 0.1};
+  state.obstacles = Positions::Constant(2, 3, 0.25);
   write_state(file(), state, kHash);
   const model::State read = read_state(file(), kHash, 17);
   EXPECT_TRUE(read.previous_v == state.previous_v);
   EXPECT_EQ(read.memory, state.memory);
+  EXPECT_EQ(read.obstacles, state.obstacles);
 }
 
 TEST_F(Checkpoint, RefusesWhatIsNotTheSameRun) {
