@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kVerticesPerBlock = 2048;
 /// Of the way to a body; the rest keeps a gap.
 constexpr double kApproach = 0.9;
-/// Of the contact distance: nearer than this counts as touching when a way is followed.
+/// Of the distance at its begin: nearer than this a way has met the body.
 constexpr double kTouching = 1e-3;
 /// Of the contact distance: where a vertex is put that would otherwise be inside.
 constexpr double kBeside = 0.5;
@@ -35,24 +35,30 @@ void Bodies::begin_step(double begin, double end) {
     begin_.push_back(collider.pose(begin));
     end_.push_back(collider.pose(end));
   }
+  now_ = begin_;
 }
 
-/// The distance changes by no more than the way: steps as long as it is cannot pass through.
+/// All shapes are convex, so the distance along a straight way is a convex function: Newton from
+/// outside never passes its first zero, and what moves along a face or away from it is free at
+/// once.
 double Bodies::free_part(int body, const Vec3& from, const Vec3& way,
                          const Eigen::Isometry3d& pose) const {
   constexpr int kMaxSteps = 64;
-  const double length = way.norm();
-  const double touching = kTouching * distance(body);
   const auto& collider = colliders_[at(body)];
-  double d = collider.signed_distance(from, pose).distance;
-  if (!(d > touching) || length <= d - touching) return 1;  // inside: may go anywhere
+  colliders::SignedDistance now = collider.signed_distance(from, pose);
+  const double touching = kTouching * now.distance;
+  if (!(now.distance > 0) || way.norm() <= now.distance - touching) return 1;
   double t = 0;
-  for (int k = 0; k < kMaxSteps && d > touching; ++k) {
-    t += (d - 0.5 * touching) / length;
-    if (t >= 1) return 1;
-    d = collider.signed_distance(from + t * way, pose).distance;
+  for (int k = 0; k < kMaxSteps && now.distance > touching; ++k) {
+    const double closing = -now.normal.dot(way);
+    if (!(closing > 0)) return 1;
+    t += now.distance / closing;
+    if (t >= 1) break;
+    now = collider.signed_distance(from + t * way, pose);
   }
-  return kApproach * t;
+  if (t >= 1 && collider.signed_distance(from + way, pose).distance > touching) return 1;
+  const double part = kApproach * std::min(t, 1.0);
+  return collider.signed_distance(from + part * way, pose).distance > 0 ? part : 0;
 }
 
 /// Cutting a way short would also end its sliding: rather beside the body where it would be in it,
@@ -65,7 +71,8 @@ Vec3 Bodies::beside(int body, const Vec3& from, const Vec3& way, double part) co
   return from + part * way;
 }
 
-void Bodies::start(const Positions& previous, const std::vector<char>& held, Positions& x) const {
+void Bodies::start(const Positions& previous, const std::vector<char>& held, Positions& x) {
+  now_ = end_;
   for (int body = 0; body < static_cast<int>(colliders_.size()); ++body) {
     const Eigen::Isometry3d carry = end_[at(body)] * begin_[at(body)].inverse();
     parallel_for(at(static_cast<int>(x.rows())), [&](std::size_t v) {
@@ -88,7 +95,7 @@ bool Bodies::limit(const Positions& from, const std::vector<char>& held, Positio
       const auto row = static_cast<Eigen::Index>(v);
       const Vec3 begin = from.row(row).transpose();
       const Vec3 way = to.row(row).transpose() - begin;
-      const double part = free_part(body, begin, way, end_[at(body)]);
+      const double part = free_part(body, begin, way, now_[at(body)]);
       if (part == 1) return 0.0;
       to.row(row) = (begin + part * way).transpose();
       return 1.0;
@@ -109,7 +116,7 @@ void Bodies::list(const Positions& x, double slack) {
           const std::size_t end = std::min(count, (block + 1) * kVerticesPerBlock);
           for (std::size_t v = block * kVerticesPerBlock; v < end; ++v) {
             const Vec3 p = x.row(static_cast<Eigen::Index>(v)).transpose();
-            const double d = colliders_[at(body)].signed_distance(p, end_[at(body)]).distance;
+            const double d = colliders_[at(body)].signed_distance(p, now_[at(body)]).distance;
             if (d < reach) blocks_[block].push_back({static_cast<int>(v), body, !(d > 0)});
           }
         },
@@ -122,7 +129,7 @@ void Bodies::activate(const Positions& x, std::vector<ActivePair>& active) const
   for (const NearBody& near : near_) {
     const auto& collider = colliders_[at(near.body)];
     const auto at_vertex =
-        collider.signed_distance(x.row(near.vertex).transpose(), end_[at(near.body)]);
+        collider.signed_distance(x.row(near.vertex).transpose(), now_[at(near.body)]);
     Activation activation = activation_;
     activation.distance = distance(near.body);
     if (!(at_vertex.distance < activation.distance)) continue;

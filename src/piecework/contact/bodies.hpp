@@ -16,7 +16,7 @@ namespace piecework::contact {
 struct NearBody {
   int vertex;
   int body;
-  /// It was inside when the step began: pushed out by a parabola, since a barrier has no inside.
+  /// It was inside when the list was made: pushed out by a parabola, since a barrier has no inside.
   bool inside;
 };
 
@@ -29,13 +29,15 @@ class Bodies {
 
   [[nodiscard]] bool empty() const { return colliders_.empty(); }
 
+  /// Bodies are at their begin until start().
   void begin_step(double begin, double end);
 
-  /// Cuts the ways of vertices from where the step began (bodies at its begin) to x (bodies at its
-  /// end) short of the bodies, seen from each body: vertices are carried along. What is held stays.
-  void start(const Positions& previous, const std::vector<char>& held, Positions& x) const;
+  /// Puts the bodies to their end and cuts the ways of vertices from where the step began (bodies
+  /// at its begin) to x short of them, seen from each body: vertices are carried along. What is
+  /// held stays. Lists are void.
+  void start(const Positions& previous, const std::vector<char>& held, Positions& x);
 
-  /// Cuts straight ways short of the bodies at the step's end; true if any was.
+  /// Cuts straight ways short of the bodies where they are now; true if any was.
   bool limit(const Positions& from, const std::vector<char>& held, Positions& to) const;
 
   /// Lists the vertices that come within contact while nothing moves farther than `slack` from x.
@@ -57,7 +59,7 @@ class Bodies {
   std::span<const colliders::AnalyticCollider> colliders_;
   Activation activation_;
   std::optional<double> friction_;
-  std::vector<Eigen::Isometry3d> begin_, end_;
+  std::vector<Eigen::Isometry3d> begin_, end_, now_;
   std::vector<NearBody> near_;
   std::vector<std::vector<NearBody>> blocks_;
 };

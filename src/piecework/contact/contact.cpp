@@ -146,6 +146,7 @@ void Contact::begin_step(const model::StepProblem& problem, double begin, double
 
 void Contact::hold_at(double fraction) {
   fraction_ = fraction;
+  report_.held_back = 1 - fraction;
   between(obstacle_begin_, obstacle_end_, fraction, obstacle_now_);
 }
 
@@ -160,7 +161,9 @@ bool Contact::held_moves(const Positions& x) const {
 
 double Contact::start(Positions& x) {
   bodies_.start(*problem_->previous, *problem_->fixed, x);
+  listed_ = -1;
   if (held_moves(x)) carry({*problem_->previous, obstacle_begin_}, x, obstacle_end_);
+  model_.sewing.follow(end_time_, x);
   between(obstacle_begin_, obstacle_end_, 1, obstacle_now_);
   fraction_ = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
   report_.held_back = 1 - fraction_;
@@ -174,6 +177,7 @@ bool Contact::advance_held(Positions& x) {
     const auto row = static_cast<Eigen::Index>(v);
     if ((*problem_->fixed)[v]) to.row(row) = problem_->predicted->row(row);
   });
+  model_.sewing.follow(end_time_, to);
   const Positions from = obstacle_now_;
   carry({x, from}, to, obstacles);
   const double part = shorten({x, from}, to, obstacles);
@@ -187,7 +191,10 @@ bool Contact::advance_held(Positions& x) {
 
 bool Contact::limit(const Positions& from, Positions& to) {
   const int before = report_.shortened;
-  if (bodies_.limit(from, *problem_->fixed, to)) ++report_.shortened;
+  if (bodies_.limit(from, *problem_->fixed, to)) {
+    ++report_.shortened;
+    model_.sewing.follow(end_time_, to);
+  }
   shorten({from, obstacle_now_}, to, obstacle_now_);
   return report_.shortened > before;
 }

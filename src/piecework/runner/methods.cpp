@@ -149,6 +149,19 @@ contact::Barrier barrier(const std::string& name) {
   return contact::Barrier::TwoStage;
 }
 
+/// \throws InputError if the scene's solver would move cloth without asking contact.
+void require_contact_solver(const scene::Scene& scene) {
+  constexpr const char* kRemedy = "or leave out \"self_collision\" and \"colliders\"";
+  if (scene.solver.method != "dd_pd")
+    throw InputError(
+        fmt::format("{}: /solver/method: \"{}\" knows nothing of contact; choose \"dd_pd\", {}",
+                    scene.source, scene.solver.method, kRemedy));
+  if (scene.solver.local != "jacobi")
+    throw InputError(fmt::format(
+        "{}: /solver/local: \"{}\" moves vertices without asking contact; write \"jacobi\", {}",
+        scene.source, scene.solver.local, kRemedy));
+}
+
 }  // namespace
 
 std::unique_ptr<global::ExactSolver> make_exact_solver(const World& world) {
@@ -195,6 +208,7 @@ std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
   const scene::Scene& scene = world.scene;
   if (!scene.self_collision && world.analytic_colliders.empty() && world.mesh_colliders.empty())
     return nullptr;
+  require_contact_solver(scene);
   contact::ContactOptions options;
   options.h = scene.step.h;
   options.self = scene.self_collision;
