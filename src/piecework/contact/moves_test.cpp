@@ -126,6 +126,16 @@ TEST(Moves, FastSheetsStopBeforeWhatIsThin) {
   }
 }
 
+// Bounds of what can meet say "just not" here, or not, by rounding.
+TEST(Moves, ThatWouldEndExactlyOnEachOtherAreCutShort) {
+  for (const double height : {0.0497, 0.1, 0.31, 1.7}) {
+    ContactStep step(stacked_sheets(2, 5, 0.004));
+    Positions wanted = step.previous;
+    wanted.col(1).setConstant(height);
+    EXPECT_EQ(step.intersections(step.go(wanted)), 0U) << height;
+  }
+}
+
 /// Held sheets below and above a free one close in on it, farther than to each other.
 TEST(Moves, WhatIsHeldStopsAtWhatIsCaughtBetween) {
   ContactStep step(stacked_sheets(3, 5, 0.1));

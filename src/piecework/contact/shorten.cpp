@@ -16,6 +16,8 @@ constexpr std::size_t kPairsPerBlock = 1024;
 constexpr double kApproach = 0.8;
 /// Rounds in which only those vertices are shortened that would hit; then all of them.
 constexpr int kLocalRounds = 8;
+/// Bounds are rounded: less of the distance must be closed than this part of it.
+constexpr double kSurely = 0.99;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -48,7 +50,7 @@ void Contact::find_hits(const PairList& list, const std::vector<double>& moved, 
           const auto bound = [&](const std::vector<double>& by) {
             return closing_bound(pair.kind, by[at(v[0])], by[at(v[1])], by[at(v[2])], by[at(v[3])]);
           };
-          const double apart = pair.distance - bound(moved);
+          const double apart = kSurely * (pair.distance - bound(moved));
           if (bound(own_way_) < apart) continue;
           const collision::PairPoints a = from(v), b = to(v);
           if (closing_on_way(pair.kind, a, b) < apart) continue;
