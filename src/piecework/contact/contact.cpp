@@ -77,13 +77,23 @@ double Obstacles::distance(double otherwise) const {
   return largest;
 }
 
+namespace {
+
+/// Otherwise there is nothing to search, and no tree is built.
+bool may_pair(const ContactOptions& options, const Obstacles& obstacles) {
+  return options.self || obstacles.num_vertices() > 0;
+}
+
+}  // namespace
+
 Contact::Contact(const model::ClothModel& model, ContactOptions options, const Colliders& colliders)
     : model_(model),
       options_(options),
       obstacles_(colliders.meshes),
       bodies_(colliders.bodies, options.activation, options.friction),
       slack_(list_slack(model, options.activation.distance)),
-      near_(collision::make_surface(model.triangles, model.num_vertices(), obstacles_.triangles(),
+      near_(collision::make_surface(may_pair(options, obstacles_) ? model.triangles : Triangles{},
+                                    model.num_vertices(), obstacles_.triangles(),
                                     obstacles_.num_vertices(), options.self),
             std::max(options.activation.distance, obstacles_.distance(options.activation.distance)),
             slack_) {

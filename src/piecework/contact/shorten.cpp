@@ -143,7 +143,7 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
       double least = 1;
       for (const Hit& hit : hits_) least = std::min(least, hit.time);
       for (double& scale : next_scale_) scale *= kApproach * least;
-      next_held_scale_ *= kApproach * least;
+      if (held_moves_) next_held_scale_ *= kApproach * least;
     }
     take_scales();
     go(from, to, obstacles);
