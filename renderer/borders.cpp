@@ -18,7 +18,7 @@ class BorderFinder {
       : mesh_(mesh),
         domain_(triangle_domain),
         reach_(reach),
-        adjacency_(build_adjacency(mesh.triangles, mesh.positions.size())) {}
+        adjacency_(build_adjacency(mesh.cloth(), mesh.positions.size())) {}
 
   Borders run() {
     find_mixed_vertices();
@@ -41,7 +41,7 @@ class BorderFinder {
   }
 
   void find_edges() {
-    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+    for (std::size_t t = 0; t < mesh_.cloth().size(); ++t) {
       const Triangle& v = mesh_.triangles[t];
       for (std::size_t i = 0; i < 3; ++i) {
         const int a = v[i];
@@ -76,7 +76,7 @@ class BorderFinder {
   /// Walks outwards from each border edge over vertices within reach; at least the triangles
   /// around both ends are touched, so that lines have round joints.
   void find_touched_triangles() {
-    seen_triangle_.assign(mesh_.triangles.size(), -1);
+    seen_triangle_.assign(mesh_.cloth().size(), -1);
     seen_vertex_.assign(mesh_.positions.size(), -1);
     for (std::size_t e = 0; e < result_.edges.size(); ++e) {
       const int edge = static_cast<int>(e);
@@ -133,7 +133,7 @@ class BorderFinder {
 }  // namespace
 
 Borders find_borders(const DisplayMesh& mesh, std::span<const int> triangle_domain, float reach) {
-  if (mesh.empty()) return {};
+  if (mesh.cloth().empty()) return {};
   return BorderFinder(mesh, triangle_domain, reach).run();
 }
 

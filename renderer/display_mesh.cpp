@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <unordered_map>
+
+#include <renderer/creases.hpp>
 
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
@@ -14,29 +17,75 @@ namespace {
 
 constexpr std::size_t kMaxSplitTriangles = 300'000;  // splitting never makes a mesh larger
 
-void check_triangles(const Frame& frame, Eigen::Index num_vertices) {
-  for (std::size_t t = 0; t < frame.triangles.size(); ++t) {
-    for (int v : frame.triangles[t]) {
+constexpr std::size_t kMaxBodyTriangles = 200'000;
+constexpr float kCrease = 35.0F;  // degrees; chosen: edges of low polyhedra and of boxes are sharp
+
+void check_triangles(std::span<const Triangle> triangles, Eigen::Index num_vertices,
+                     const std::string& what) {
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (int v : triangles[t]) {
       if (v < 0 || v >= num_vertices) {
-        throw InputError("frame: triangle " + std::to_string(t) + ": vertex " + std::to_string(v) +
-                         " does not exist; there are " + std::to_string(num_vertices));
+        throw InputError(what + ": triangle " + std::to_string(t) + ": vertex " +
+                         std::to_string(v) + " does not exist; there are " +
+                         std::to_string(num_vertices));
       }
     }
   }
 }
 
-void check_finite(const Positions& positions) {
+void check_finite(const Positions& positions, const std::string& what, const char* cause) {
   if (positions.allFinite()) return;
   for (Eigen::Index v = 0; v < positions.rows(); ++v) {
     if (positions.row(v).allFinite()) continue;
-    throw InputError("frame: vertex " + std::to_string(v) +
-                     ": position is not a finite number; the simulation has probably diverged");
+    throw InputError(what + ": vertex " + std::to_string(v) +
+                     ": position is not a finite number; " + cause);
   }
 }
 
-void set_positions(DisplayMesh& mesh, const Positions& positions) {
-  const Vec3 low = positions.colwise().minCoeff().transpose();
-  const Vec3 high = positions.colwise().maxCoeff().transpose();
+void check_bodies(std::span<const Body> bodies) {
+  for (const Body& body : bodies) {
+    const std::string what = "frame: body " + std::to_string(&body - bodies.data());
+    check_triangles(body.triangles, body.positions != nullptr ? body.positions->rows() : 0, what);
+    if (body.positions != nullptr) check_finite(*body.positions, what, "look at its motion");
+  }
+}
+
+struct Extent {
+  Vec3 low, high;
+
+  explicit Extent(const Positions& x)
+      : low(x.colwise().minCoeff().transpose()), high(x.colwise().maxCoeff().transpose()) {}
+  /// With what of `other` is nearer than `reach`, axis by axis.
+  void include(const Extent& other, double reach) {
+    const Vec3 far_low = low.array() - reach;
+    const Vec3 far_high = high.array() + reach;
+    if ((other.low.array() > far_high.array()).any()) return;
+    if ((other.high.array() < far_low.array()).any()) return;
+    low = low.cwiseMin(other.low.cwiseMax(far_low));
+    high = high.cwiseMax(other.high.cwiseMin(far_high));
+  }
+};
+
+/// The box [low, high] of the picture, m. \pre the frame has something to draw
+Extent extent_of(const Frame& frame) {
+  if (frame.triangles.empty()) {
+    Extent all(*frame.bodies.front().positions);
+    for (const Body& body : frame.bodies)
+      all.include(Extent(*body.positions), std::numeric_limits<double>::infinity());
+    return all;
+  }
+  const Extent cloth(*frame.positions);
+  Extent all = cloth;
+  for (const Body& body : frame.bodies) {
+    Extent near = cloth;
+    near.include(Extent(*body.positions), (cloth.high - cloth.low).norm());
+    all.include(near, std::numeric_limits<double>::infinity());
+  }
+  return all;
+}
+
+void set_units(DisplayMesh& mesh, const Extent& extent) {
+  const auto& [low, high] = extent;
   mesh.centre = low / 2 + high / 2;
   const double half_diagonal = (high / 2 - low / 2).norm();
   if (!std::isfinite(half_diagonal)) {
@@ -46,12 +95,19 @@ void set_positions(DisplayMesh& mesh, const Positions& positions) {
   if (!std::isfinite(mesh.scale)) mesh.scale = 1.0;
   mesh.low = mesh.to_display(low).cast<float>();
   mesh.high = mesh.to_display(high).cast<float>();
-  mesh.num_frame_vertices = static_cast<std::size_t>(positions.rows());
-  mesh.positions.resize(mesh.num_frame_vertices);
-  parallel_for(mesh.num_frame_vertices, [&](std::size_t v) {
+}
+
+/// \pre set_units()
+void set_surface(DisplayMesh& mesh, const Positions& positions,
+                 std::span<const Triangle> triangles) {
+  mesh.positions.resize(static_cast<std::size_t>(positions.rows()));
+  parallel_for(mesh.positions.size(), [&](std::size_t v) {
     const Vec3 p = positions.row(static_cast<Eigen::Index>(v)).transpose();
     mesh.positions[v] = mesh.to_display(p).cast<float>();
   });
+  mesh.triangles.assign(triangles.begin(), triangles.end());
+  mesh.source.resize(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.source.size(); ++t) mesh.source[t] = static_cast<int>(t);
 }
 
 /// Area-weighted vertex normals. Where the faces around a vertex cancel (triangles wound in
@@ -186,6 +242,21 @@ bool has_long_edge(const DisplayMesh& mesh, float longest) {
   });
 }
 
+void append_body(const Body& body, float longest_edge, DisplayMesh& mesh) {
+  DisplayMesh part;
+  part.centre = mesh.centre;
+  part.scale = mesh.scale;
+  set_surface(part, *body.positions, body.triangles);
+  split_at_creases(part, kCrease);
+  set_normals(part);
+  split_long_edges(part, longest_edge, kMaxBodyTriangles);
+  const int first = static_cast<int>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), part.positions.begin(), part.positions.end());
+  mesh.normals.insert(mesh.normals.end(), part.normals.begin(), part.normals.end());
+  for (const auto& [a, b, c] : part.triangles)
+    mesh.triangles.push_back({first + a, first + b, first + c});
+}
+
 }  // namespace
 
 Adjacency build_adjacency(std::span<const Triangle> triangles, std::size_t num_vertices) {
@@ -217,18 +288,24 @@ void split_long_edges(DisplayMesh& mesh, float longest_edge, std::size_t max_tri
 }
 
 DisplayMesh build_display_mesh(const Frame& frame, float longest_edge) {
-  DisplayMesh mesh;
   const bool has_positions = frame.positions != nullptr && frame.positions->rows() > 0;
-  check_triangles(frame, has_positions ? frame.positions->rows() : 0);
-  if (!has_positions) return mesh;
-  check_finite(*frame.positions);
-  if (frame.triangles.empty()) return mesh;
-  set_positions(mesh, *frame.positions);
-  mesh.triangles.assign(frame.triangles.begin(), frame.triangles.end());
-  mesh.source.resize(mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.source.size(); ++t) mesh.source[t] = static_cast<int>(t);
-  set_normals(mesh);
-  split_long_edges(mesh, longest_edge, kMaxSplitTriangles);
+  check_triangles(frame.triangles, has_positions ? frame.positions->rows() : 0, "frame");
+  if (has_positions)
+    check_finite(*frame.positions, "frame", "the simulation has probably diverged");
+  check_bodies(frame.bodies);
+  DisplayMesh mesh;
+  const auto is_empty = [](const Body& body) { return body.triangles.empty(); };
+  if (std::any_of(frame.bodies.begin(), frame.bodies.end(), is_empty))
+    throw InputError("frame: a body has no triangles");
+  if (frame.triangles.empty() && frame.bodies.empty()) return mesh;
+  set_units(mesh, extent_of(frame));
+  if (!frame.triangles.empty()) {
+    set_surface(mesh, *frame.positions, frame.triangles);
+    mesh.num_frame_vertices = mesh.positions.size();
+    set_normals(mesh);
+    split_long_edges(mesh, longest_edge, kMaxSplitTriangles);
+  }
+  for (const Body& body : frame.bodies) append_body(body, longest_edge, mesh);
   return mesh;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// The frame's mesh as it is drawn: checked, centred, scaled to unit size, with vertex normals, and
-// with long edges split so that light stored at vertices is fine enough.
+// The frame's meshes as they are drawn: checked, centred, scaled to unit size, with vertex normals,
+// and with long edges split so that light stored at vertices is fine enough.
 
 #include <cstdint>
 #include <span>
@@ -26,24 +26,29 @@ struct Adjacency {
 
 Adjacency build_adjacency(std::span<const Triangle> triangles, std::size_t num_vertices);
 
-/// Display units: the mesh's bounding box has its centre at 0 and half diagonal 1, so that nothing
-/// behind this point depends on the size of the scene.
+/// Display units: the box [low, high] has its centre at 0 and half diagonal 1, so that nothing
+/// behind this point depends on the size of the scene. It is the box of the cloth and of what of
+/// the bodies is nearer to it than its diagonal.
 struct DisplayMesh {
   Vec3 centre{0, 0, 0};  ///< m
   double scale = 1;      ///< display units per metre
   Vec3f low{0, 0, 0}, high{0, 0, 0};
-  std::vector<Vec3f> positions;  ///< vertices of the frame first, then those of split edges
-  std::vector<Vec3f> normals;    ///< unit length
-  std::vector<Triangle> triangles;
-  std::vector<int> source;  ///< per triangle: its triangle in the frame
+  std::vector<Vec3f> positions;     ///< of the cloth, then those of its split edges, then of bodies
+  std::vector<Vec3f> normals;       ///< unit length
+  std::vector<Triangle> triangles;  ///< of the cloth, then of bodies
+  std::vector<int> source;          ///< per triangle of the cloth: its triangle in the frame
   std::size_t num_frame_vertices = 0;
 
   [[nodiscard]] bool empty() const { return triangles.empty(); }
+  [[nodiscard]] std::span<const Triangle> cloth() const {
+    return {triangles.data(), source.size()};
+  }
   [[nodiscard]] Vec3 to_display(const Vec3& metres) const { return (metres - centre) * scale; }
 };
 
 /// \param longest_edge  display units; longer edges are split (0: none is)
-/// \throws InputError if positions are missing or not finite, or a triangle names no vertex.
+/// \throws InputError if positions are missing or not finite, or a triangle names no vertex, of the
+///         cloth or of a body.
 DisplayMesh build_display_mesh(const Frame& frame, float longest_edge);
 
 /// The same surface with every edge longer than `longest_edge` halved until none is left or the

@@ -61,6 +61,7 @@ void check(const Frame& frame, const Style& style) {
           "style: supersampling: must be 1, 2 or 3");
   require(!style.ground_height || std::isfinite(*style.ground_height),
           "style: ground_height: must be finite");
+  require(style.back >= 0 && style.back <= 1, "style: back: must be within 0 ... 1");
   if (frame.triangles.empty()) return;
   const auto num_vertices =
       static_cast<std::size_t>(frame.positions != nullptr ? frame.positions->rows() : 0);
@@ -79,7 +80,9 @@ DisplayView display_view(const Camera& camera, const DisplayMesh& mesh, int heig
   require(view.eye.norm() < 1e6, "camera: the eye is too far from the mesh to draw it");
   const double depth = -view.eye.dot(view.basis.forward);  // of the mesh's centre
   view.near_depth = std::max({depth - 4.0, 0.02 * depth, 0.01});
-  view.far_depth = std::max(depth, 0.0) + 12.0;
+  float farthest = 0;  // bodies may be large
+  for (const Vec3f& p : mesh.positions) farthest = std::max(farthest, p.norm());
+  view.far_depth = std::max(depth, 0.0) + std::max(12.0, static_cast<double>(farthest));
   view.pixel = 2.0 * view.basis.slope / height;
   return view;
 }
@@ -150,12 +153,13 @@ void set_vertices(const std::vector<VertexLight>& light, DrawData& data) {
   });
 }
 
-/// Triangles in drawing order: those that carry border lines need a costlier shader and come last.
+/// The cloth's triangles in drawing order: those that carry border lines need a costlier shader and
+/// come last.
 std::vector<int> drawing_order(const DisplayMesh& mesh, const std::vector<int>& last) {
   std::vector<int> order;
-  order.reserve(mesh.triangles.size());
+  order.reserve(mesh.cloth().size());
   std::size_t next = 0;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < mesh.cloth().size(); ++t) {
     if (next < last.size() && last[next] == static_cast<int>(t)) {
       ++next;
     } else {
@@ -181,8 +185,10 @@ void set_corners(const DisplayMesh& mesh, const Triangle& triangle, std::array<f
 void set_triangles(const Frame& frame, const Style& style, DrawData& data) {
   const std::vector<int> order = drawing_order(data.mesh, data.borders.triangles);
   const Colorist colorist(frame, style);
-  data.num_plain_triangles = order.size() - data.borders.triangles.size();
-  data.indices.resize(3 * order.size());
+  data.num_border_triangles = data.borders.triangles.size();
+  data.num_plain_triangles = order.size() - data.num_border_triangles;
+  data.num_body_triangles = data.mesh.triangles.size() - order.size();
+  data.indices.resize(3 * data.mesh.triangles.size());
   data.colors.resize(order.size());
   data.corners.resize(style.mesh_lines ? 3 * order.size() : 0);
   parallel_for(order.size(), [&](std::size_t i) {
@@ -195,6 +201,8 @@ void set_triangles(const Frame& frame, const Style& style, DrawData& data) {
       set_corners(data.mesh, frame.triangles[data.mesh.source[t]], &data.corners[3 * i]);
     }
   });
+  for (std::size_t t = order.size(); t < data.mesh.triangles.size(); ++t)
+    std::copy(data.mesh.triangles[t].begin(), data.mesh.triangles[t].end(), &data.indices[3 * t]);
 }
 
 float sqrt_linear(float encoded) { return std::sqrt(linear_from_srgb(encoded)); }
@@ -267,7 +275,7 @@ DrawData prepare(const Frame& frame, const Camera& camera, const Style& style, i
     data.borders = find_borders(data.mesh, frame.triangle_domain, static_cast<float>(reach));
   }
   set_triangles(frame, style, data);
-  if (style.color == ColorMode::Dof) set_dots(frame, height, data);
+  if (style.color == ColorMode::Dof && !frame.triangles.empty()) set_dots(frame, height, data);
   return data;
 }
 

@@ -41,9 +41,10 @@ struct DrawData {
   GroundLight ground;       ///< texels empty: no ground is drawn
   float ground_height = 0;  ///< display units
   std::vector<GpuVertex> vertices;
-  std::vector<std::uint32_t> indices;  ///< triangles without border segments first
-  std::size_t num_plain_triangles = 0;
-  std::vector<std::array<std::uint8_t, 4>> colors;  ///< per triangle as drawn
+  /// Triangles of the cloth without border segments, with border segments, those of bodies.
+  std::vector<std::uint32_t> indices;
+  std::size_t num_plain_triangles = 0, num_border_triangles = 0, num_body_triangles = 0;
+  std::vector<std::array<std::uint8_t, 4>> colors;  ///< per triangle of the cloth as drawn
   std::vector<std::array<float, 4>> corners;        ///< three per triangle, for mesh lines
   Borders borders;
   std::vector<GpuDot> dots;

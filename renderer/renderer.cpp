@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include <renderer/color.hpp>
 #include <renderer/draw_data.hpp>
 #include <renderer/gl_context.hpp>
 #include <renderer/gl_program.hpp>
@@ -63,6 +64,13 @@ const void* offset_of(std::size_t bytes) {
 
 enum TextureUnit : int { kColorsUnit, kRangesUnit, kSegmentsUnit, kCornersUnit, kGroundUnit };
 
+/// What the shader of cloth is made for.
+enum class Surface { Plain, Borders, Body };
+
+Eigen::Vector3f linear(const Rgb& color) {
+  return {linear_from_srgb(color.r), linear_from_srgb(color.g), linear_from_srgb(color.b)};
+}
+
 /// A buffer that shaders read through a buffer texture.
 struct BufferTexture {
   GLuint buffer = 0, texture = 0;
@@ -83,7 +91,7 @@ struct Renderer::Impl {
   void create_cloth_array();
   void create_dot_array();
   BufferTexture create_buffer_texture();
-  const GlProgram& cloth_program(bool borders, bool mesh_lines);
+  const GlProgram& surface_program(Surface surface, bool mesh_lines);
   const GlProgram& program(const char* name, const char* vertex, const char* fragment,
                            const std::string& defines = {});
 
@@ -97,7 +105,7 @@ struct Renderer::Impl {
 
   void resize_framebuffer(int samples_x, int samples_y);
   void draw_tile(const DrawData& data, const Style& style, const Tile& tile);
-  void draw_cloth(const DrawData& data, const Style& style, const Eigen::Matrix4f& clip);
+  void draw_surfaces(const DrawData& data, const Style& style, const Eigen::Matrix4f& clip);
   void draw_ground(const DrawData& data, const Eigen::Matrix4f& clip, const Tile& tile,
                    int samples);
   void draw_background(const Tile& tile, int samples);
@@ -186,14 +194,17 @@ const GlProgram& Renderer::Impl::program(const char* name, const char* vertex, c
   return programs.emplace(name, GlProgram(context->gl(), vertex, fragment, defines)).first->second;
 }
 
-const GlProgram& Renderer::Impl::cloth_program(bool borders, bool mesh_lines) {
-  std::string name = "cloth";
+const GlProgram& Renderer::Impl::surface_program(Surface surface, bool mesh_lines) {
+  std::string name = "surface";
   std::string defines;
-  if (borders) {
+  if (surface == Surface::Borders) {
     name += " borders";
     defines += "#define BORDERS\n";
   }
-  if (mesh_lines) {
+  if (surface == Surface::Body) {
+    name += " body";
+    defines += "#define BODY\n";
+  } else if (mesh_lines) {
     name += " mesh lines";
     defines += "#define MESH_LINES\n";
   }
@@ -274,19 +285,21 @@ void Renderer::Impl::set_backdrop(const GlProgram& used, const Tile& tile, int s
   used.set("u_rows", static_cast<float>(height * samples));
 }
 
-void Renderer::Impl::draw_cloth(const DrawData& data, const Style& style,
-                                const Eigen::Matrix4f& clip) {
+void Renderer::Impl::draw_surfaces(const DrawData& data, const Style& style,
+                                   const Eigen::Matrix4f& clip) {
   const GlFunctions& gl = context->gl();
   gl.BindVertexArray(cloth_array);
-  const std::size_t total = data.indices.size() / 3;
-  const std::size_t plain = data.num_plain_triangles;
   struct Part {
-    bool borders;
+    Surface surface;
     std::size_t first, count;
   };
-  for (const Part& part : {Part{false, 0, plain}, Part{true, plain, total - plain}}) {
+  const std::size_t num_cloth = data.num_plain_triangles + data.num_border_triangles;
+  for (const Part& part :
+       {Part{Surface::Plain, 0, data.num_plain_triangles},
+        Part{Surface::Borders, data.num_plain_triangles, data.num_border_triangles},
+        Part{Surface::Body, num_cloth, data.num_body_triangles}}) {
     if (part.count == 0) continue;
-    const GlProgram& used = cloth_program(part.borders, style.mesh_lines);
+    const GlProgram& used = surface_program(part.surface, style.mesh_lines);
     used.use();
     used.set("u_clip", clip);
     used.set("u_eye", Eigen::Vector3f(data.view.eye.cast<float>()));
@@ -301,6 +314,8 @@ void Renderer::Impl::draw_cloth(const DrawData& data, const Style& style,
     used.set("u_corners", static_cast<int>(kCornersUnit));
     used.set("u_border_pixels", data.border_pixels);
     used.set("u_line_pixels", data.line_pixels);
+    used.set("u_back", style.back);
+    used.set("u_body", linear(style.body));
     gl.DrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * part.count), GL_UNSIGNED_INT,
                     offset_of(3 * part.first * sizeof(std::uint32_t)));
   }
@@ -362,7 +377,7 @@ void Renderer::Impl::draw_tile(const DrawData& data, const Style& style, const T
   gl.Clear(GL_DEPTH_BUFFER_BIT);
   const Eigen::Matrix4f clip = clip_matrix(data.view, width, height, tile);
   // Front to back: what the cloth covers is never shaded as ground or background.
-  if (!data.indices.empty()) draw_cloth(data, style, clip);
+  if (!data.indices.empty()) draw_surfaces(data, style, clip);
   if (!data.ground.texels.empty()) draw_ground(data, clip, tile, samples);
   gl.DepthFunc(GL_LEQUAL);
   draw_background(tile, samples);

@@ -24,6 +24,12 @@ enum class ColorMode { Domain, Dof, Strain, Shaded };
 /// Which kind of unknown a vertex is (drawn as dots in ColorMode::Dof).
 enum class DofClass : std::uint8_t { Internal, Duplicate, Corner };
 
+/// A solid beside the cloth, drawn in Style::body. Smooth, but sharp edges stay sharp.
+struct Body {
+  const Positions* positions = nullptr;  ///< |V| x 3, m
+  std::span<const Triangle> triangles;   ///< counter-clockwise seen from outside
+};
+
 /// Everything to draw; spans must outlive the call to draw().
 struct Frame {
   const Positions* positions = nullptr;  ///< |V| x 3, m
@@ -32,6 +38,7 @@ struct Frame {
   std::span<const Rgb> domain_colors;      ///< per domain; see domain_palette()
   std::span<const float> triangle_value;   ///< per triangle; needed by Strain
   std::span<const DofClass> vertex_class;  ///< per vertex; needed by Dof
+  std::span<const Body> bodies;            ///< what the cloth touches
 };
 
 struct Camera {
@@ -64,6 +71,8 @@ struct Style {
   std::string value_label = "strain";
   std::string caption;              ///< small text in the lower left corner, e.g. "t = 0.25 s"
   Rgb fabric{0.45F, 0.58F, 0.74F};  ///< colour of the cloth in ColorMode::Shaded
+  Rgb body{0.74F, 0.72F, 0.69F};    ///< colour of bodies
+  float back = 1;  ///< factor of the cloth's colours on its back side; below 1: folds show inside
 };
 
 struct Image {

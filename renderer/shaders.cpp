@@ -10,6 +10,12 @@ layout(location = 1) in vec3 a_normal;
 layout(location = 2) in vec4 a_ambient;
 layout(location = 3) in float a_key;
 uniform mat4 u_clip;
+#ifdef BODY
+uniform vec3 u_eye;
+// Triangles of cloth cut a little into bodies that only their vertices keep off; this far behind
+// itself, seen from the eye, a body does not show through them. Display units.
+const float kBehind = 0.004;
+#endif
 out vec3 v_position;
 out vec3 v_normal;
 out vec4 v_ambient;
@@ -19,7 +25,11 @@ void main() {
   v_normal = a_normal;
   v_ambient = a_ambient;
   v_key = a_key;
+#ifdef BODY
+  gl_Position = u_clip * vec4(a_position + kBehind * normalize(a_position - u_eye), 1.0);
+#else
   gl_Position = u_clip * vec4(a_position, 1.0);
+#endif
 }
 )glsl";
 
@@ -33,6 +43,8 @@ uniform vec3 u_key_direction;
 uniform vec3 u_fill_direction;
 uniform samplerBuffer u_colors;   // per drawn triangle, square root of linear light
 uniform int u_first_triangle;
+uniform float u_back;             // factor of the colour on the back side
+uniform vec3 u_body;              // colour of bodies, linear light
 uniform float u_pixel;            // size of a pixel at depth 1
 uniform float u_samples;          // per pixel and axis
 out vec4 o_color;
@@ -98,8 +110,12 @@ float mesh_ink(float pixel) {
 #endif
 
 void main() {
+#ifdef BODY
+  vec3 albedo = u_body;
+#else
   vec3 code = texelFetch(u_colors, gl_PrimitiveID + u_first_triangle).rgb;
   vec3 albedo = code * code;
+#endif
 #if defined(BORDERS) || defined(MESH_LINES)
   float pixel = u_pixel / gl_FragCoord.w;
 #endif
@@ -114,11 +130,18 @@ void main() {
   if (!gl_FrontFacing) {
     normal = -normal;
     ambient = v_ambient.zw;
+#ifndef BODY
+    albedo *= u_back;
+#endif
   }
   vec3 view = normalize(u_eye - v_position);
   float facing = dot(normal, u_key_direction);
   float lit = max(facing, 0.0) * v_key;
+#ifdef BODY
+  const float through = 0.0;
+#else
   float through = max(-facing, 0.0) * v_key;   // thin cloth glows a little against the light
+#endif
   float fill = 0.5 + 0.5 * dot(normal, u_fill_direction);
   vec3 light = kKey * (lit + 0.16 * through) + kSky * ambient.x + kBounce * ambient.y +
                kFill * (fill * (ambient.x + ambient.y));

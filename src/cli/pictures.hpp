@@ -27,8 +27,9 @@ struct PictureOptions {
 /// What the scene's `render` says.
 PictureOptions picture_options(const scene::Scene& scene);
 
-/// Opens and closes an OpenGL context as take_pictures() will. \throws BackendError, InputError.
-void check_pictures(const PictureOptions& options);
+/// Opens and closes an OpenGL context as take_pictures() will. \throws BackendError; InputError,
+/// also if the colours show contact and nothing in the scene can touch.
+void check_pictures(const scene::Scene& scene, const PictureOptions& options);
 
 /// One picture to take.
 struct Shot {
@@ -39,7 +40,7 @@ struct Shot {
 };
 
 /// Draws all shots with one camera and one colour scale that fit all of them, and writes them.
-/// \throws BackendError without any OpenGL; OutputError.
+/// \throws BackendError without any OpenGL; InputError as check_pictures(); OutputError.
 void take_pictures(const runner::World& world, const std::vector<Shot>& shots,
                    const PictureOptions& options, Progress& progress);
 

@@ -126,8 +126,9 @@ void add_render(CLI::App& program, Action& action, const Verbosity& verbosity) {
   app->add_option("-o,--output", arguments->output,
                   "PNG file; of a run: relative to its directory, with {frame} or {frame:04}");
   app->add_option("--frames", arguments->frames, "A:B, A: or :B [all]");
-  app->add_option("--color", arguments->color, "domain, dof, strain or shaded [as the scene says]")
-      ->check(CLI::IsMember({"domain", "dof", "strain", "shaded"}));
+  app->add_option("--color", arguments->color,
+                  "domain, dof, strain, contact or shaded [as the scene says]")
+      ->check(CLI::IsMember({"domain", "dof", "strain", "contact", "shaded"}));
   app->add_option("--size", arguments->size, "Picture size, e.g. 1920x1080");
   app->add_option("--gl", arguments->gl, "OpenGL provider")
       ->check(CLI::IsMember({"auto", "osmesa", "egl"}));

@@ -183,7 +183,7 @@ int run(const RunArguments& arguments, const Verbosity& verbosity) {
   options.save_states = !arguments.no_state || !arguments.no_images;
   for (const std::string& name : arguments.exports) options.exports.push_back(export_format(name));
   // Without OpenGL a run with pictures would fail only at its end: find out now.
-  if (!arguments.no_images) check_pictures(pictures_for(scene, arguments));
+  if (!arguments.no_images) check_pictures(scene, pictures_for(scene, arguments));
 
   const runner::RunOutcome outcome = [&] {
     // Stops after the frame in progress, with a checkpoint. Only while it simulates: a signal while
@@ -224,8 +224,9 @@ void add_run(CLI::App& program, Action& action, const Verbosity& verbosity) {
   app->add_flag("--no-state", arguments->no_state,
                 "Keep no state/ files (`piecework render` needs them)");
   app->add_flag("--fast-images", arguments->fast_images, "No shadows, no ambient occlusion");
-  app->add_option("--color", arguments->color, "domain, dof, strain or shaded [as the scene says]")
-      ->check(CLI::IsMember({"domain", "dof", "strain", "shaded"}));
+  app->add_option("--color", arguments->color,
+                  "domain, dof, strain, contact or shaded [as the scene says]")
+      ->check(CLI::IsMember({"domain", "dof", "strain", "contact", "shaded"}));
   app->add_option("--size", arguments->size, "Picture size, e.g. 1920x1080 [as the scene says]");
   app->add_option("--export", arguments->exports, "Also write each frame's mesh: ply, obj or vtp")
       ->check(CLI::IsMember({"ply", "obj", "vtp"}))
