@@ -14,8 +14,6 @@ namespace piecework::contact {
 namespace {
 
 constexpr std::size_t kPairsPerBlock = 1024;
-/// Of what is left of their way: pins and obstacles that can go no farther wait for the cloth.
-constexpr double kWorthMoving = 0.05;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -24,15 +22,6 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 double list_slack(const model::ClothModel& model, double distance) {
   constexpr double kOfEdge = 0.15;
   return std::max(0.5 * distance, kOfEdge * model.mean_edge);
-}
-
-void between(const Positions& a, const Positions& b, double fraction, Positions& out) {
-  out.resize(a.rows(), 3);
-  parallel_for(static_cast<std::size_t>(a.rows()), [&](std::size_t i) {
-    const auto v = static_cast<Eigen::Index>(i);
-    out.row(v) = fraction == 1 ? Eigen::RowVector3d(b.row(v))
-                               : Eigen::RowVector3d(a.row(v) + fraction * (b.row(v) - a.row(v)));
-  });
 }
 
 }  // namespace
@@ -144,7 +133,8 @@ void Contact::begin_step(const model::StepProblem& problem, double begin, double
   }
   lags_ = obstacles.rows() > 0;
   if (lags_) obstacle_begin_ = obstacles;
-  hold_at(0);
+  obstacle_now_ = obstacle_begin_;
+  arrived_ = true;
   if (!has_friction_) return;
   // Pressure as the step before left it: what touches only now slides freely until it is renewed.
   const Stopwatch watch;
@@ -154,10 +144,10 @@ void Contact::begin_step(const model::StepProblem& problem, double begin, double
   renew_friction();
 }
 
-void Contact::hold_at(double fraction) {
-  fraction_ = fraction;
-  report_.held_back = 1 - fraction;
-  between(obstacle_begin_, obstacle_end_, fraction, obstacle_now_);
+void Contact::take_back_start() {
+  std::swap(obstacle_now_, obstacle_before_);
+  arrived_ = true;
+  report_.held_back = 0;
 }
 
 bool Contact::held_moves(const Positions& x) const {
@@ -174,14 +164,20 @@ double Contact::start(Positions& x) {
   listed_ = -1;
   if (held_moves(x)) carry({*problem_->previous, obstacle_begin_}, x, obstacle_end_);
   model_.sewing.follow(end_time_, x);
-  between(obstacle_begin_, obstacle_end_, 1, obstacle_now_);
-  fraction_ = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
-  report_.held_back = 1 - fraction_;
-  return fraction_;
+  std::swap(obstacle_now_, obstacle_before_);
+  obstacle_now_ = obstacle_end_;
+  const HeldWay held = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
+  note_held(held);
+  return held.least;
+}
+
+void Contact::note_held(const HeldWay& held) {
+  arrived_ = held.least == 1;
+  report_.held_back = 1 - held.least;
 }
 
 bool Contact::advance_held(Positions& x) {
-  if (fraction_ == 1) return false;
+  if (arrived_) return false;
   Positions to = x, obstacles = obstacle_end_;
   parallel_for(static_cast<std::size_t>(x.rows()), [&](std::size_t v) {
     const auto row = static_cast<Eigen::Index>(v);
@@ -190,10 +186,9 @@ bool Contact::advance_held(Positions& x) {
   model_.sewing.follow(end_time_, to);
   const Positions from = obstacle_now_;
   carry({x, from}, to, obstacles);
-  const double part = shorten({x, from}, to, obstacles);
-  if (part < kWorthMoving) return false;  // or the gap would shrink to nothing, bit by bit
-  fraction_ = part == 1 ? 1 : fraction_ + part * (1 - fraction_);
-  report_.held_back = 1 - fraction_;
+  const HeldWay held = shorten({x, from}, to, obstacles);
+  if (held.most == 0) return false;
+  note_held(held);
   std::swap(x, to);
   std::swap(obstacle_now_, obstacles);
   return true;
@@ -356,8 +351,7 @@ void Contact::stiffness(const Positions& normals, model::ContactStiffness& stiff
 }
 
 Positions Contact::lagging_obstacles() const {
-  return fraction_ < 1 && obstacle_now_.rows() > 0 && !obstacles_.are_static() ? obstacle_now_
-                                                                               : Positions();
+  return arrived_ || obstacles_.are_static() ? Positions() : obstacle_now_;
 }
 
 void Contact::end_step(const Positions& x) {

@@ -68,7 +68,7 @@ class Contact final : public model::ContactTerms {
   void begin_step(const model::StepProblem& problem, double begin, double end,
                   const Positions& obstacles) override;
   double start(Positions& x) override;
-  void hold_at(double fraction) override;
+  void take_back_start() override;
   bool advance_held(Positions& x) override;
   bool limit(const Positions& from, Positions& to) override;
   double evaluate(const Positions& x, Positions& gradient) override;
@@ -83,14 +83,20 @@ class Contact final : public model::ContactTerms {
   [[nodiscard]] const model::ContactReport& report() const override { return report_; }
 
  private:
+  /// Parts of their ways that what is held can go.
+  struct HeldWay {
+    double least = 1, most = 1;
+  };
   struct Hit {
     std::size_t pair;
     double time;
   };
 
-  /// Shortens the way from the points `from` to `to` and obstacles_end; returns the fraction that
-  /// what is held may go.
-  double shorten(const Points& from, Positions& to, Positions& obstacles);
+  /// Shortens the way from the points `from` to `to` and obstacles_end; returns how far
+  /// what is held can go.
+  HeldWay shorten(const Points& from, Positions& to, Positions& obstacles);
+  [[nodiscard]] HeldWay held_way() const;
+  void note_held(const HeldWay& held);
   /// \param moved  PairList::moved(from)
   void find_hits(const PairList& list, const std::vector<double>& moved, const Points& from,
                  const Points& to, bool first);
@@ -138,8 +144,9 @@ class Contact final : public model::ContactTerms {
   const model::StepProblem* problem_ = nullptr;
   double end_time_ = 0;
   Positions obstacle_begin_, obstacle_end_, obstacle_now_;
-  bool lags_ = false;    ///< obstacles were not where they belong when it began
-  double fraction_ = 1;  ///< of the way of what is held
+  Positions obstacle_before_;  ///< before the last start()
+  bool lags_ = false;          ///< obstacles were not where they belong when it began
+  bool arrived_ = true;        ///< what is held is where the step wants it
   model::ContactReport report_;
 
   std::vector<ActivePair> active_;
@@ -152,8 +159,6 @@ class Contact final : public model::ContactTerms {
   std::vector<double> scale_, next_scale_;
   std::vector<char> changed_;
   std::vector<double> moved_, own_way_;
-  double held_scale_ = 1, next_held_scale_ = 1;
-  bool held_moves_ = false;
   std::vector<Hit> hits_;
   std::vector<std::vector<Hit>> hit_blocks_;
 };

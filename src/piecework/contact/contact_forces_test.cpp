@@ -27,7 +27,8 @@ struct Crumpled : ContactStep {
       (void)energy(previous);
       (void)contact->renew_friction();
     }
-    contact->hold_at(1);
+    Positions still = previous;
+    (void)contact->start(still);
     x = previous + testing::random_positions(model.num_vertices(), 0.5 * offset, 4);
   }
 

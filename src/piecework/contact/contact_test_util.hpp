@@ -74,11 +74,13 @@ struct ContactStep {
     (void)contact->evaluate(x, g);
     return g;
   }
-  /// Edges through triangles, cloth and meshes at `time`, by exact arithmetic.
+  /// Edges through triangles, cloth and meshes, by exact arithmetic: meshes where the contact says
+  /// that they lag, else at `time`.
   [[nodiscard]] std::size_t intersections(const Positions& x, double time = 0) const {
     const Obstacles obstacles{std::span(meshes)};
     Positions placed;
     obstacles.place(time, placed);
+    if (contact && contact->lagging_obstacles().rows() > 0) placed = contact->lagging_obstacles();
     Positions all(x.rows() + placed.rows(), 3);
     all << x, placed;
     const auto surface =

@@ -150,16 +150,17 @@ TEST(Moves, WhatIsHeldStopsAtWhatIsCaughtBetween) {
   EXPECT_EQ(step.contact->report().held_back, 1 - part);
   for (int move = 0; move < 30; ++move) {
     EXPECT_EQ(step.intersections(x), 0U);
-    const double done = 1 - step.contact->report().held_back;
     for (Eigen::Index v = 0; v < 75; ++v) {
       if (!step.fixed[static_cast<std::size_t>(v)]) continue;
-      const Eigen::RowVector3d there =
-          step.previous.row(v) + done * (wanted - step.previous).row(v);
-      EXPECT_LT((x.row(v) - there).norm(), 1e-12) << "one fraction for all of them";
+      const Eigen::RowVector3d way = (wanted - step.previous).row(v);
+      const double done = (x - step.previous).row(v).dot(way) / way.squaredNorm();
+      EXPECT_LT(((x - step.previous).row(v) - done * way).norm(), 1e-12) << "each on its way";
+      EXPECT_GE(done, 0);
+      EXPECT_LE(done, 1);
     }
     (void)step.contact->advance_held(x);
   }
-  EXPECT_GT(step.contact->report().held_back, 0.3) << "they would have passed each other";
+  EXPECT_GT(step.contact->report().held_back, 0) << "they would have passed each other";
 }
 
 TEST(Moves, MovingMeshesPushAndAreHeldBackToo) {
@@ -172,11 +173,11 @@ TEST(Moves, MovingMeshesPushAndAreHeldBackToo) {
   double part = 1;
   Positions x = step.go(step.previous, 0, 0.01, &part);
   EXPECT_LT(part, 0.5) << "the sheet above is held, that between caught";
-  EXPECT_EQ(step.intersections(x, 0.01 * part), 0U);
-  const double first = step.contact->report().held_back;
-  EXPECT_TRUE(step.contact->advance_held(x));
-  EXPECT_LT(step.contact->report().held_back, first) << "there was room left";
-  EXPECT_EQ(step.intersections(x, 0.01 * (1 - step.contact->report().held_back)), 0U);
+  EXPECT_GT(step.contact->lagging_obstacles().rows(), 0);
+  EXPECT_EQ(step.intersections(x), 0U);
+  for (int move = 0; move < 10 && step.contact->advance_held(x); ++move)
+    EXPECT_EQ(step.intersections(x), 0U);
+  EXPECT_GT(step.contact->report().held_back, 0);
 }
 
 TEST(Moves, FrictionStartsFromWhereBodiesAreWhenTheStepBegins) {

@@ -14,6 +14,8 @@ namespace {
 constexpr std::size_t kPairsPerBlock = 1024;
 /// Of the way to the first contact; the rest keeps a gap.
 constexpr double kApproach = 0.8;
+/// Of its way: less is not worth it for what is held.
+constexpr double kWorthMoving = 0.05;
 /// Rounds in which only those vertices are shortened that would hit; then all of them.
 constexpr int kLocalRounds = 8;
 /// Bounds are rounded: less of the distance must be closed than this part of it.
@@ -65,32 +67,41 @@ void Contact::find_hits(const PairList& list, const std::vector<double>& moved, 
 }
 
 void Contact::lower_scale(int vertex, double part) {
-  if (is_held(vertex)) {
-    if (held_moves_) next_held_scale_ = std::min(next_held_scale_, held_scale_ * part);
-    return;
-  }
   const auto lower = [&](int v) {
-    if (!is_held(v)) next_scale_[at(v)] = std::min(next_scale_[at(v)], scale_[at(v)] * part);
+    const bool held = is_held(v);
+    if (held && way_.row(v).isZero(0)) return;
+    double scale = scale_[at(v)] * part;
+    // What is held waits for the cloth, or their gap would shrink to nothing, bit by bit.
+    if (held && scale < kWorthMoving) scale = 0;
+    next_scale_[at(v)] = std::min(next_scale_[at(v)], scale);
   };
   // What is sewn goes as far as what carries it.
-  if (model_.sewing.empty())
+  if (vertex >= model_.num_vertices() || model_.sewing.empty())
     lower(vertex);
   else
     model_.sewing.map().visit_carriers(vertex, [&](int carrier, double) { lower(carrier); });
 }
 
 void Contact::take_scales() {
-  parallel_for(scale_.size(), [&](std::size_t v) {
-    const bool held = is_held(static_cast<int>(v));
-    changed_[v] = held ? next_held_scale_ != held_scale_ : next_scale_[v] != scale_[v];
-    scale_[v] = held ? next_held_scale_ : next_scale_[v];
-  });
-  held_scale_ = next_held_scale_;
+  parallel_for(scale_.size(), [&](std::size_t v) { changed_[v] = next_scale_[v] != scale_[v]; });
+  std::swap(scale_, next_scale_);
   if (model_.sewing.empty()) return;
   for (int v = 0; v < model_.num_vertices(); ++v)
     model_.sewing.map().visit_carriers(v, [&](int carrier, double) {
       if (changed_[at(carrier)]) changed_[at(v)] = 1;
     });
+}
+
+Contact::HeldWay Contact::held_way() const {
+  const auto of_held = [&](const auto& value) {
+    return parallel_max(scale_.size(), [&](std::size_t v) {
+      const bool moves =
+          is_held(static_cast<int>(v)) && !way_.row(static_cast<Eigen::Index>(v)).isZero(0);
+      return moves ? value(scale_[v]) : 0.0;
+    });
+  };
+  const double missing = of_held([](double scale) { return 1 - scale; });
+  return {1 - missing, missing > 0 ? of_held([](double scale) { return scale; }) : 1};
 }
 
 void Contact::go(const Points& from, Positions& to, Positions& obstacles) {
@@ -107,7 +118,7 @@ void Contact::go(const Points& from, Positions& to, Positions& obstacles) {
   model_.sewing.follow(end_time_, to);
 }
 
-double Contact::shorten(const Points& from, Positions& to, Positions& obstacles) {
+Contact::HeldWay Contact::shorten(const Points& from, Positions& to, Positions& obstacles) {
   Stopwatch watch;
   // Obstacles that stay are both ends of the way at once: keep the first apart from the second.
   const Points end{to, obstacles};
@@ -117,25 +128,20 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
   list.moved(from, moved_);
   own_motion(from.count(), model_.num_vertices(), from, end, own_way_);
   find_hits(list, moved_, from, end, true);
-  held_scale_ = 1;
-  if (!hits_.empty()) {
+  HeldWay held;
+  const bool any = !hits_.empty();
+  if (any) {
     ++report_.shortened;
     way_.resize(from.count(), 3);
     parallel_for(at(from.count()), [&](std::size_t v) {
       way_.row(static_cast<Eigen::Index>(v)) =
           (end(static_cast<int>(v)) - from(static_cast<int>(v))).transpose();
     });
-    held_moves_ =
-        parallel_max(at(from.count()), [&](std::size_t v) {
-          const bool held = is_held(static_cast<int>(v));
-          return held ? way_.row(static_cast<Eigen::Index>(v)).cwiseAbs().maxCoeff() : 0.0;
-        }) > 0;
     scale_.assign(at(from.count()), 1.0);
     changed_.assign(at(from.count()), 0);
   }
   for (int round = 0; !hits_.empty(); ++round) {
     next_scale_ = scale_;
-    next_held_scale_ = held_scale_;
     if (round < kLocalRounds) {
       for (const Hit& hit : hits_)
         for (const int v : list.pairs[hit.pair].vertices) lower_scale(v, kApproach * hit.time);
@@ -143,7 +149,6 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
       double least = 1;
       for (const Hit& hit : hits_) least = std::min(least, hit.time);
       for (double& scale : next_scale_) scale *= kApproach * least;
-      if (held_moves_) next_held_scale_ *= kApproach * least;
     }
     take_scales();
     go(from, to, obstacles);
@@ -151,8 +156,9 @@ double Contact::shorten(const Points& from, Positions& to, Positions& obstacles)
     own_motion(from.count(), model_.num_vertices(), from, end, own_way_);
     find_hits(list, moved_, from, end, false);
   }
+  if (any) held = held_way();
   report_.narrow_ms += watch.lap();
-  return held_scale_;
+  return held;
 }
 
 }  // namespace piecework::contact

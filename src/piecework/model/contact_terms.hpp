@@ -33,7 +33,7 @@ struct ContactReport {
   int candidates = 0;         ///< pairs that the broad phase proposed last
   int shortened = 0;          ///< moves that would have passed through something
   int interpenetrations = 0;  ///< edges that pass through triangles after the step
-  double held_back = 0;       ///< fraction of the motion of pins and obstacles that cloth barred
+  double held_back = 0;       ///< largest part of the way of a pin or obstacle that cloth barred
   double cull_ms = 0;         ///< Cull: broad phase
   double narrow_ms = 0;       ///< Nrw.: distances, forces, continuous detection
   double check_ms = -1;       ///< the independent check for interpenetrations; negative: off
@@ -53,12 +53,12 @@ class ContactTerms {
                           const Positions& obstacles) = 0;
 
   /// Shortens the straight way from the start of the step to x, vertex by vertex, so that nothing
-  /// passes through anything; pins and obstacles move along. Returns the fraction of their way that
-  /// they could go: 1 as a rule, less where cloth is caught between them.
+  /// passes through anything; pins and obstacles move along. Returns the least part of its way that
+  /// any of these could go: 1 as a rule, less where cloth is caught between them.
   virtual double start(Positions& x) = 0;
 
-  /// Puts obstacles back to a fraction of their way that start() returned.
-  virtual void hold_at(double fraction) = 0;
+  /// Puts obstacles back to where the start() before the last had brought them. \pre it returned 1
+  virtual void take_back_start() = 0;
 
   /// Moves pins in x, and obstacles, on towards where the step wants them, as far as the cloth lets
   /// them. False: nothing has moved.

@@ -36,6 +36,9 @@ constexpr int kEasyIterations = 2;
 constexpr double kSafety = 4;  // increments up to so many tolerances must be exact
 constexpr double kPcgGrowth = 1.5;
 constexpr int kPcgAllowance = 10;
+/// Times in a step that pins and obstacles which cloth has barred try to go on. What it then still
+/// bars, pinched between them, waits for the next step.
+constexpr int kHeldAttempts = 10;
 constexpr double kLongestWait = 16;  // steps between two attempts without normals
 /// Without normals an error is believed if the gradient allows at most so many times as much...
 constexpr double kBelief = 100;
@@ -127,7 +130,7 @@ void DdPd::choose_start(const model::StepProblem& problem, const Positions& pred
   evaluate(now_, problem, report);
   if (!problem.extrapolated || held < 1) return;
   trial_.x = *problem.extrapolated;
-  if (contact_ && contact_->start(trial_.x) < 1) return contact_->hold_at(held);
+  if (contact_ && contact_->start(trial_.x) < 1) return contact_->take_back_start();
   evaluate(trial_, problem, report);
   if (trial_.energy < now_.energy)
     std::swap(now_, trial_);
@@ -277,7 +280,9 @@ bool DdPd::line_search(const model::StepProblem& problem, double slope, model::S
 
 /// Pins and obstacles that cloth barred go on.
 void DdPd::advance_held(const model::StepProblem& problem, model::StepReport& report) {
-  if (!contact_ || !contact_->advance_held(now_.x)) return;
+  if (!contact_ || contact_->report().held_back == 0 || held_attempts_ == 0) return;
+  --held_attempts_;
+  if (!contact_->advance_held(now_.x)) return;
   evaluate(now_, problem, report);
   acceleration_->restart();
 }
@@ -323,13 +328,15 @@ void DdPd::begin_step(const model::StepProblem& problem, model::StepReport& repo
   newton_proposed_ = newton_failed_ = false;
   if (newton_) newton_->begin();
   renewals_left_ = options_.friction_renewals;
+  held_attempts_ = kHeldAttempts;
   without_progress_ = 0;
 }
 
 /// Whether the iterate ends the step, and whether anything is still to be had.
 void DdPd::judge(const model::StepProblem& problem, model::StepReport& report) {
   report.converged = convergence_.reached(report) && believable(report);
-  if (report.converged && contact_ && contact_->report().held_back > 0) report.converged = false;
+  const bool waiting = contact_ && contact_->report().held_back > 0 && held_attempts_ > 0;
+  if (waiting) report.converged = false;
   if (report.converged && renewals_left_-- > 0 && renew_friction(problem, report))
     report.converged = false;
   if (report.gradient < kProgress * best_gradient_) {

@@ -120,6 +120,7 @@ class DdPd final : public model::Minimizer {
   int without_progress_ = 0;  ///< iterations
   double best_gradient_ = 0;  ///< of the step
   int renewals_left_ = 0;     ///< of friction
+  int held_attempts_ = 0;     ///< left
   Point now_, trial_;
   Positions gradient_;  ///< |V| x 3
   Positions d_;         ///< n_f x 3

@@ -14,7 +14,7 @@ std::vector<float> contact_pressure(const World& world, const Positions& x, doub
   const std::vector<char> held(static_cast<std::size_t>(model.num_vertices()), 0);
   const model::StepProblem still{.predicted = &x, .fixed = &held, .previous = &x};
   const auto contact = make_contact(world);
-  contact->begin_step(still, time, time);
+  contact->begin_step(still, time, time, {});
   Positions force = Positions::Zero(x.rows(), 3);
   contact->evaluate(x, force);
 
