@@ -147,7 +147,8 @@ void report_convergence(const runner::RunOutcome& outcome) {
 bool report_interpenetrations(const runner::RunOutcome& outcome, bool strict) {
   const int worst = runner::totals(outcome.record.frames).interpenetrations;
   if (worst > 0)
-    say("{}: up to {} edges pass through triangles after a step (run.json says when)\n",
+    say("{}: up to {} edges pass through triangles, or vertices are inside of bodies, after a step "
+        "(run.json says when)\n",
         strict ? "interpenetration" : "note", worst);
   return worst == 0 || !strict;
 }

@@ -47,26 +47,27 @@ Bounds box(const Vec3& low, const Vec3& high) {
   return bounds;
 }
 
-constexpr const char* kBall = R"({"shape": "sphere", "center": [0, 0.1, 0], "radius": 0.15,
+constexpr const char* kBall =
+    R"({"name": "b1", "shape": "sphere", "center": [0, 0.1, 0], "radius": 0.15,
                                    "motion": {"velocity": [2, 0, 0]}})";
 
 TEST(Scenery, TheGroundIsTheHighestLevelPlaneThatFacesUp) {
   EXPECT_FALSE(level_ground(*world_with(kBall), 0));
   const auto world = world_with(
-      R"({"shape": "plane", "point": [3, -0.5, 0]},
-         {"shape": "plane", "point": [0, -2, 0], "normal": [0, 3, 0],
+      R"({"name": "b2", "shape": "plane", "point": [3, -0.5, 0]},
+         {"name": "b3", "shape": "plane", "point": [0, -2, 0], "normal": [0, 3, 0],
           "motion": {"velocity": [0, 1, 0]}},
-         {"shape": "plane", "point": [0, 5, 0], "normal": [0, -1, 0]},
-         {"shape": "plane", "point": [0, 0, 0], "normal": [0.1, 1, 0]})");
+         {"name": "b4", "shape": "plane", "point": [0, 5, 0], "normal": [0, -1, 0]},
+         {"name": "b5", "shape": "plane", "point": [0, 0, 0], "normal": [0.1, 1, 0]})");
   EXPECT_DOUBLE_EQ(level_ground(*world, 0).value(), -0.5);
   EXPECT_DOUBLE_EQ(level_ground(*world, 1.75).value(), -0.25);
 }
 
 TEST(Scenery, LevelPlanesAndWallsSeenFromBehindAreNotDrawn) {
   const auto world = world_with(
-      R"({"shape": "plane", "point": [0, -1, 0]},
-         {"shape": "plane", "point": [0, 0, -2], "normal": [0, 0, 1]},
-         {"shape": "plane", "point": [0, 5, 0], "normal": [0, -1, 0]},)" +
+      R"({"name": "b6", "shape": "plane", "point": [0, -1, 0]},
+         {"name": "b7", "shape": "plane", "point": [0, 0, -2], "normal": [0, 0, 1]},
+         {"name": "b8", "shape": "plane", "point": [0, 5, 0], "normal": [0, -1, 0]},)" +
       std::string(kBall));
   const Bounds cloth = box({-0.2, 0.3, -0.2}, {0.2, 0.3, 0.2});
   EXPECT_EQ(bodies_at(*world, 0, {0, 1, 3}, cloth).size(), 3U);
@@ -84,8 +85,8 @@ TEST(Scenery, BodiesAreWhereTheyAreAtTheTime) {
     EXPECT_LT((ball.high - Vec3(2 * time + 0.15, 0.25, 0.15)).norm(), 0.01) << time;
     EXPECT_LT((bounds_of_bodies(*world, time).low - ball.low).norm(), 1e-12);
   }
-  EXPECT_TRUE(bounds_of_bodies(*world_with(R"({"shape": "plane", "normal": [1, 1, 0]},
-      {"shape": "half_spaces", "planes": [{"normal": [1, 0, 0]}, {"normal": [0, 1, 0]}]})"),
+  EXPECT_TRUE(bounds_of_bodies(*world_with(R"({"name": "b9", "shape": "plane", "normal": [1, 1, 0]},
+      {"name": "b10", "shape": "half_spaces", "planes": [{"normal": [1, 0, 0]}, {"normal": [0, 1, 0]}]})"),
                                0)
                   .empty())
       << "unbounded";
@@ -150,7 +151,8 @@ std::pair<int, double> grey(const render::Image& image) {
 }
 
 TEST_F(RunPictures, ShowCollidersAndTheirMotion) {
-  const std::string fast = R"({"shape": "sphere", "center": [0, 0.1, 0], "radius": 0.15,
+  const std::string fast =
+      R"({"name": "b11", "shape": "sphere", "center": [0, 0.1, 0], "radius": 0.15,
                                "motion": {"velocity": [60, 0, 0]}})";
   const auto [first, last] = run(scene_with(fast), "--fast-images --color shaded");
   const auto [before, x_before] = grey(first);
@@ -163,7 +165,8 @@ TEST_F(RunPictures, ShowCollidersAndTheirMotion) {
 // Under the plane y = 0 the picture's ground has its shadows elsewhere than far below the cloth.
 TEST_F(RunPictures, LevelPlanesAreTheGround) {
   const auto floor = [](double y) {
-    return scene_with(fmt::format(R"({{"shape": "plane", "point": [0, {}, 0]}})", y));
+    return scene_with(
+        fmt::format(R"({{"name": "b12", "shape": "plane", "point": [0, {}, 0]}})", y));
   };
   const auto high = run(floor(0.25), "").first;
   const auto low = run(floor(-3), "").first;
@@ -172,10 +175,12 @@ TEST_F(RunPictures, LevelPlanesAreTheGround) {
 }
 
 TEST_F(RunPictures, ContactHasAColour) {
-  const std::string near = R"({"shape": "plane", "point": [0, 0.2995, 0]})";
+  const std::string near = R"({"name": "b13", "shape": "plane", "point": [0, 0.2995, 0]})";
   const auto touching = run(scene_with(near), "--color contact").first;
   const auto apart =
-      run(scene_with(R"({"shape": "plane", "point": [0, 0.2985, 0]})"), "--color contact").first;
+      run(scene_with(R"({"name": "b14", "shape": "plane", "point": [0, 0.2985, 0]})"),
+          "--color contact")
+          .first;
   std::size_t strong = 0, strong_apart = 0;
   for (std::size_t i = 0; i < touching.rgb.size(); i += 3) {
     strong += touching.rgb[i] > touching.rgb[i + 2] + 60 ? 1U : 0U;

@@ -125,6 +125,17 @@ void Bodies::list(const Positions& x, double slack) {
   }
 }
 
+int Bodies::count_inside(const Positions& x) const {
+  double count = 0;
+  for (int body = 0; body < static_cast<int>(colliders_.size()); ++body)
+    count += parallel_sum<double>(at(static_cast<int>(x.rows())), [&](std::size_t v) {
+      const Vec3 p = x.row(static_cast<Eigen::Index>(v)).transpose();
+      const double d = colliders_[at(body)].signed_distance(p, end_[at(body)]).distance;
+      return d < 0 ? 1.0 : 0.0;
+    });
+  return static_cast<int>(count);
+}
+
 void Bodies::activate(const Positions& x, std::vector<ActivePair>& active) const {
   for (const NearBody& near : near_) {
     const auto& collider = colliders_[at(near.body)];

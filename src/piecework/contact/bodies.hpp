@@ -43,6 +43,9 @@ class Bodies {
   /// Lists the vertices that come within contact while nothing moves farther than `slack` from x.
   void list(const Positions& x, double slack);
 
+  /// Vertices that are inside of a body at the step's end.
+  [[nodiscard]] int count_inside(const Positions& x) const;
+
   /// Adds contacts at x to `active`, in the order of the list.
   void activate(const Positions& x, std::vector<ActivePair>& active) const;
 

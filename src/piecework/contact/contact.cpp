@@ -357,11 +357,13 @@ Positions Contact::lagging_obstacles() const {
 void Contact::end_step(const Positions& x) {
   if (!options_.check) return;
   const Stopwatch watch;
-  if (!options_.self && obstacle_now_.rows() == 0) return;
-  Positions all(x.rows() + obstacle_now_.rows(), 3);
-  all << x, obstacle_now_;
-  report_.interpenetrations =
-      static_cast<int>(collision::find_intersections(near_.surface(), all).size());
+  report_.interpenetrations = bodies_.count_inside(x);
+  if (may_pair(options_, obstacles_)) {
+    Positions all(x.rows() + obstacle_now_.rows(), 3);
+    all << x, obstacle_now_;
+    report_.interpenetrations +=
+        static_cast<int>(collision::find_intersections(near_.surface(), all).size());
+  }
   report_.check_ms = watch.elapsed_ms();
 }
 
