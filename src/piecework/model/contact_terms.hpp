@@ -29,16 +29,14 @@ struct ContactBlock {
 
 /// Counts and times of one step.
 struct ContactReport {
-  int pairs = 0;       ///< closer than the contact distance at the end of the step
-  int candidates = 0;  ///< pairs that the broad phase proposed last
-  int shortened = 0;   ///< moves that would have passed through something
-  /// After the step: edges that pass through triangles, and vertices inside of bodies with a closed
-  /// form.
-  int interpenetrations = 0;
-  double held_back = 0;  ///< largest part of the way of a pin or obstacle that cloth barred
-  double cull_ms = 0;    ///< Cull: broad phase
-  double narrow_ms = 0;  ///< Nrw.: distances, forces, continuous detection
-  double check_ms = -1;  ///< the independent check for interpenetrations; negative: off
+  int pairs = 0;              ///< closer than the contact distance at the end of the step
+  int candidates = 0;         ///< pairs that the broad phase proposed last
+  int shortened = 0;          ///< moves that would have passed through something
+  int interpenetrations = 0;  ///< after the step: edges through triangles, vertices inside bodies
+  double held_back = 0;       ///< largest part of the way of a pin or obstacle that cloth barred
+  double cull_ms = 0;         ///< Cull: broad phase
+  double narrow_ms = 0;       ///< Nrw.: distances, forces, continuous detection
+  double check_ms = -1;       ///< the independent check for interpenetrations; negative: off
 
   [[nodiscard]] double detection_ms() const { return cull_ms + narrow_ms; }
 };

@@ -377,7 +377,7 @@ TEST_F(SceneFiles, UnknownNamesAreAnsweredWithTheNearest) {
             "scenes/two_sheet.json: no such file, nor a built-in scene; did you mean "
             "\"two_sheets\"?");
   EXPECT_TRUE(message_of(folder_).starts_with(
-      folder_.string() + ": is a folder, not a scene; known built-in scenes: flag_in_wind, "));
+      folder_.string() + ": is a folder, not a scene; known built-in scenes: cloth_on_stairs, "));
 }
 
 TEST_F(SceneFiles, EnvironmentNamesTheFolder) {
