@@ -425,7 +425,7 @@ TEST_F(Cli, CheckSaysWhatIsOnAndRunsNothing) {
   const Result result = call("check " + scene());
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_NE(result.out.find("sound"), std::string::npos);
-  EXPECT_NE(result.out.find("wind         -"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("wind           -"), std::string::npos) << result.out;
   EXPECT_NE(result.out.find("border (44)"), std::string::npos) << result.out;
 }
 
