@@ -114,8 +114,9 @@ pd::ContactSolve contact_solve(const World& world) {
                          .max_iterations = scene.quality.pcg_max};
   solve.options.domains = std::max(1, scene.solver.domains);
   solve.options.steps = scene.quality.sd_iterations;
-  solve.options.elastic_weight =
-      model::assemble_system(world.model, scene.step.h).diagonal().mean();
+  if (solve.method == global::DiagonalMethod::SteepestDescent)
+    solve.options.elastic_weight =
+        model::assemble_system(world.model, scene.step.h).diagonal().mean();
   if (solve.method != global::DiagonalMethod::Refactor && scene.solver.global != "tree")
     throw InputError(fmt::format(
         "{}: /solver/contact: \"{}\" works on the tree only; take `global: tree`, or `contact: "
@@ -214,8 +215,9 @@ std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
   options.self = scene.self_collision;
   options.activation = {.barrier = barrier(scene.contact.barrier),
                         .distance = contact_distance(world),
-                        .stiffness = scene.contact.stiffness.value_or(
-                            contact::default_stiffness(world.model, scene.step.h))};
+                        .stiffness = scene.contact.stiffness
+                                         ? *scene.contact.stiffness
+                                         : contact::default_stiffness(world.model, scene.step.h)};
   options.friction = scene.friction;
   options.slip_speed = scene.contact.slip_speed;
   options.ccd.method =
