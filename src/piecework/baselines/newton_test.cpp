@@ -188,6 +188,10 @@ TEST(HessianMatrix, ScalarsAndProductsAreTheBlocks) {
   const Eigen::VectorXd expected = dense * Eigen::Map<const Eigen::VectorXd>(x.data(), x.size());
   EXPECT_LT((Eigen::Map<const Eigen::VectorXd>(y.data(), y.size()) - expected).norm(),
             1e-13 * expected.norm());
+  H.assemble_rounded(step.z, step.problem(), HessianForm::Unprojected);
+  H.multiply_rounded(x, y);
+  EXPECT_LT((Eigen::Map<const Eigen::VectorXd>(y.data(), y.size()) - expected).norm(),
+            1e-6 * expected.norm());
 }
 
 }  // namespace

@@ -5,6 +5,9 @@
 namespace piecework::collision {
 namespace {
 
+/// Of a squared sine: below this an angle is all rounding.
+constexpr double kParallel = 1e-14;
+
 Closest combination(const std::array<double, 4>& beta, const PairPoints& x) {
   // Differences first: exact where vertices are close, however far from the origin.
   const Vec3 offset = beta[1] * (x[1] - x[0]) + beta[2] * (x[2] - x[0]) + beta[3] * (x[3] - x[0]);
@@ -42,8 +45,7 @@ Closest closest_vertex_triangle(const PairPoints& x) {
   const double a11 = e1.squaredNorm(), a12 = e1.dot(e2), a22 = e2.squaredNorm();
   const double r1 = e1.dot(r), r2 = e2.dot(r);
   const double det = a11 * a22 - a12 * a12;
-  // Below this the face has no direction that rounding left alone.
-  if (det > 1e-14 * a11 * a22) {
+  if (det > kParallel * a11 * a22) {
     const double b2 = (a22 * r1 - a12 * r2) / det, b3 = (a11 * r2 - a12 * r1) / det;
     const double b1 = 1 - b2 - b3;
     if (b1 >= 0 && b2 >= 0 && b3 >= 0) return combination({1, -b1, -b2, -b3}, x);
@@ -51,27 +53,22 @@ Closest closest_vertex_triangle(const PairPoints& x) {
   return closest_vertex_border(x);
 }
 
+/// Clamped coordinate descent: the distance is convex in (s, u), so after the interior minimum over
+/// s is clamped, the best u for it, and the best s for that u clamped, it is at its minimum
+/// [Ericson 2005, Sec. 5.1.9].
 Closest closest_edge_edge(const PairPoints& x) {
   const Vec3 e = x[1] - x[0], f = x[3] - x[2], r = x[0] - x[2];
   const double a = e.squaredNorm(), b = e.dot(f), c = f.squaredNorm();
   const double d = e.dot(r), g = f.dot(r);
   const double det = a * c - b * b;
-  if (det > 1e-14 * a * c) {
-    const double s = (b * g - c * d) / det, u = (a * g - b * d) / det;
-    if (s >= 0 && s <= 1 && u >= 0 && u <= 1) return combination({1 - s, s, -(1 - u), -u}, x);
+  // Parallel edges are as close everywhere along their overlap: any s will do to begin with.
+  double s = det > kParallel * a * c ? std::clamp((b * g - c * d) / det, 0.0, 1.0) : 0.0;
+  double u = c > 0 ? (b * s + g) / c : -1.0;
+  if (!(u >= 0 && u <= 1)) {  // or the second edge is a point
+    u = u > 1 ? 1.0 : 0.0;
+    s = a > 0 ? std::clamp((b * u - d) / a, 0.0, 1.0) : 0.0;
   }
-  // Otherwise an end of one edge is closest to the other.
-  Closest best{};
-  for (int k = 0; k < 4; ++k) {
-    double s = k == 0 ? 0.0 : 1.0, u = k == 2 ? 0.0 : 1.0;
-    if (k < 2)
-      u = closest_on_segment(x[static_cast<std::size_t>(k)], x[2], x[3]);
-    else
-      s = closest_on_segment(x[static_cast<std::size_t>(k)], x[0], x[1]);
-    const Closest candidate = combination({1 - s, s, -(1 - u), -u}, x);
-    if (k == 0 || candidate.distance_sq < best.distance_sq) best = candidate;
-  }
-  return best;
+  return combination({1 - s, s, -(1 - u), -u}, x);
 }
 
 }  // namespace piecework::collision

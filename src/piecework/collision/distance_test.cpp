@@ -62,6 +62,23 @@ TEST(Distance, HandlesDegenerateElements) {
   EXPECT_DOUBLE_EQ(closest_edge_edge({o, a, b + up, 2 * b + up}).distance_sq, 2);  // ends apart
   EXPECT_DOUBLE_EQ(closest_edge_edge({o, o, p, p}).distance_sq, 1.25);             // two points
   EXPECT_DOUBLE_EQ(closest_edge_edge({o, b, a, a + up}).distance_sq, 0);           // touching
+  EXPECT_DOUBLE_EQ(closest_edge_edge({o, b, p, p}).distance_sq, 1);  // second: a point
+  EXPECT_DOUBLE_EQ(closest_edge_edge({p, p, o, b}).distance_sq, 1);  // first: a point
+}
+
+TEST(Distance, EdgesThatBecomeParallelKeepTheirDistance) {
+  // Above each other by 1, with ends that stick out; turned by ever less about the middle.
+  int checked = 0;
+  for (double angle = 1; angle > 1e-12; angle *= 0.1)
+    for (const double shift : {-0.9, 0.0, 0.4, 1.7}) {
+      const Vec3 along(std::cos(angle), std::sin(angle), 0), middle(shift, 0, 1);
+      const PairPoints x{Vec3(-1, 0, 0), Vec3(1, 0, 0), middle - along, middle + along};
+      EXPECT_NEAR(closest_edge_edge(x).distance_sq,
+                  std::pow(sampled_distance(PairKind::EdgeEdge, x), 2), 1e-5)
+          << angle << ' ' << shift;
+      ++checked;
+    }
+  EXPECT_GE(checked, 48);
 }
 
 TEST(Distance, ItsGradientIsBetaTimesTheDirection) {

@@ -1,13 +1,10 @@
-// A way on which what is held and moves does not run into cloth: it takes along what is near.
+#include <piecework/contact/carry.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include <piecework/contact/contact.hpp>
-#include <piecework/core/clock.hpp>
 #include <piecework/core/parallel.hpp>
-#include <piecework/model/stepper.hpp>
 
 namespace piecework::contact {
 namespace {
@@ -22,10 +19,8 @@ std::size_t first_size(const NearPair& pair) {
   return pair.kind == collision::PairKind::VertexTriangle ? 1 : 2;
 }
 
-}  // namespace
-
 /// 0 or 1: that element of the pair is held, and the other is not; -1: neither is so.
-int Contact::held_element(const NearPair& pair) const {
+int held_element(const NearPair& pair, const Held& is_held) {
   const std::size_t first = first_size(pair);
   int held[2] = {0, 0};
   for (std::size_t k = 0; k < 4; ++k) held[k < first ? 0 : 1] += is_held(pair.vertices[k]);
@@ -35,11 +30,13 @@ int Contact::held_element(const NearPair& pair) const {
   return all_first ? 0 : 1;
 }
 
-std::vector<int> Contact::nearest_held(const std::vector<NearPair>& pairs, const Points& x) const {
-  std::vector<int> nearest(at(model_.num_vertices()), -1);
+/// For each vertex of cloth the pair with the nearest held element, or -1.
+std::vector<int> nearest_held(const std::vector<NearPair>& pairs, const Held& is_held,
+                              const Points& x) {
+  std::vector<int> nearest(at(is_held.num_cloth), -1);
   std::vector<double> nearest_sq(nearest.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const int held = held_element(pairs[i]);
+    const int held = held_element(pairs[i], is_held);
     if (held < 0) continue;
     const double distance_sq = collision::closest(pairs[i].kind, x(pairs[i].vertices)).distance_sq;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -53,12 +50,12 @@ std::vector<int> Contact::nearest_held(const std::vector<NearPair>& pairs, const
   return nearest;
 }
 
-void Contact::carry(const Points& from, Positions& x, const Positions& obstacles) {
-  const Stopwatch watch;
+}  // namespace
+
+void carry(const std::vector<NearPair>& pairs, const Held& is_held, const Points& from,
+           Positions& x, const Positions& obstacles) {
   const Points to{x, obstacles};
-  near_.cover(from, to);
-  const std::vector<NearPair>& pairs = near_.candidates().pairs;
-  const std::vector<int> nearest = nearest_held(pairs, from);
+  const std::vector<int> nearest = nearest_held(pairs, is_held, from);
   parallel_for(nearest.size(), [&](std::size_t v) {
     if (nearest[v] < 0) return;
     const auto row = static_cast<Eigen::Index>(v);
@@ -66,7 +63,7 @@ void Contact::carry(const Points& from, Positions& x, const Positions& obstacles
     const collision::Closest closest = collision::closest(pair.kind, from(pair.vertices));
     const double gap = std::sqrt(closest.distance_sq);
     if (!(gap > 0)) return;
-    const int held = held_element(pair);
+    const int held = held_element(pair, is_held);
     Vec3 carried = Vec3::Zero();
     for (std::size_t k = 0; k < 4; ++k)
       if ((k < first_size(pair) ? 0 : 1) == held)
@@ -76,8 +73,6 @@ void Contact::carry(const Points& from, Positions& x, const Positions& obstacles
     const double too_close = -relative.dot(normal) - kApproach * gap;
     if (too_close > 0) x.row(row) += too_close * normal.transpose();
   });
-  model_.sewing.follow(end_time_, x);
-  report_.narrow_ms += watch.elapsed_ms();
 }
 
 }  // namespace piecework::contact

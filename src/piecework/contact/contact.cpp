@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <piecework/collision/intersections.hpp>
+#include <piecework/contact/carry.hpp>
 #include <piecework/core/clock.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/model/assembly.hpp>
@@ -14,6 +15,8 @@ namespace piecework::contact {
 namespace {
 
 constexpr std::size_t kPairsPerBlock = 1024;
+/// Bounds are rounded: what is farther than this times the contact distance is out of reach.
+constexpr double kSurely = 1.01;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -85,7 +88,8 @@ Contact::Contact(const model::ClothModel& model, ContactOptions options, const C
                                     model.num_vertices(), obstacles_.triangles(),
                                     obstacles_.num_vertices(), options.self),
             std::max(options.activation.distance, obstacles_.distance(options.activation.distance)),
-            slack_) {
+            slack_),
+      filter_(model, options.ccd) {
   obstacles_.place(0, rest_obstacles_);
   const auto rubs = [](const auto& collider) { return collider.traits().friction.has_value(); };
   has_friction_ = options.friction ||
@@ -113,14 +117,12 @@ double Contact::friction_of(const NearPair& pair) const {
   return options_.friction.value_or(0);
 }
 
-bool Contact::is_held(int v) const {
-  return v >= model_.num_vertices() || (*problem_->fixed)[at(v)] != 0;
-}
-
 void Contact::begin_step(const model::StepProblem& problem, double begin, double end,
                          const Positions& obstacles) {
   problem_ = &problem;
+  is_held_ = {model_.num_vertices(), problem.fixed};
   end_time_ = end;
+  filter_.begin_step(is_held_, end);
   report_ = {};
   active_.clear();
   sliding_.clear();
@@ -162,18 +164,18 @@ bool Contact::held_moves(const Positions& x) const {
 double Contact::start(Positions& x) {
   bodies_.start(*problem_->previous, *problem_->fixed, x);
   listed_ = -1;
-  if (held_moves(x)) carry({*problem_->previous, obstacle_begin_}, x, obstacle_end_);
+  if (held_moves(x)) carry_along({*problem_->previous, obstacle_begin_}, x, obstacle_end_);
   model_.sewing.follow(end_time_, x);
   std::swap(obstacle_now_, obstacle_before_);
   obstacle_now_ = obstacle_end_;
-  const HeldWay held = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
-  note_held(held);
-  return held.least;
+  const Shortening way = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
+  note_held(way);
+  return way.least;
 }
 
-void Contact::note_held(const HeldWay& held) {
-  arrived_ = held.least == 1;
-  report_.held_back = 1 - held.least;
+void Contact::note_held(const Shortening& way) {
+  arrived_ = way.least == 1;
+  report_.held_back = 1 - way.least;
 }
 
 bool Contact::advance_held(Positions& x) {
@@ -185,10 +187,10 @@ bool Contact::advance_held(Positions& x) {
   });
   model_.sewing.follow(end_time_, to);
   const Positions from = obstacle_now_;
-  carry({x, from}, to, obstacles);
-  const HeldWay held = shorten({x, from}, to, obstacles);
-  if (held.most == 0) return false;
-  note_held(held);
+  carry_along({x, from}, to, obstacles);
+  const Shortening way = shorten({x, from}, to, obstacles);
+  if (way.most == 0) return false;
+  note_held(way);
   std::swap(x, to);
   std::swap(obstacle_now_, obstacles);
   return true;
@@ -204,7 +206,26 @@ bool Contact::limit(const Positions& from, Positions& to) {
   return report_.shortened > before;
 }
 
-void Contact::find_active_pairs(std::span<const NearPair> pairs, const Points& points) {
+void Contact::carry_along(const Points& from, Positions& x, const Positions& obstacles) {
+  const Stopwatch watch;
+  near_.cover(from, {x, obstacles});
+  carry(near_.candidates().pairs, is_held_, from, x, obstacles);
+  model_.sewing.follow(end_time_, x);
+  report_.narrow_ms += watch.elapsed_ms();
+}
+
+Shortening Contact::shorten(const Points& from, Positions& to, Positions& obstacles) {
+  Stopwatch watch;
+  if (near_.cover(from, {to, obstacles})) report_.cull_ms += watch.lap();
+  const Shortening way = filter_.shorten(near_, from, to, obstacles);
+  if (way.any) ++report_.shortened;
+  report_.narrow_ms += watch.lap();
+  return way;
+}
+
+void Contact::find_active_pairs(const PairList& list, const Points& points) {
+  const std::vector<NearPair>& pairs = list.pairs;
+  list.moved(points, moved_);
   const Points rest{model_.start, rest_obstacles_};
   active_blocks_.resize((pairs.size() + kPairsPerBlock - 1) / kPairsPerBlock);
   parallel_for(
@@ -214,8 +235,11 @@ void Contact::find_active_pairs(std::span<const NearPair> pairs, const Points& p
         const std::size_t end = std::min(pairs.size(), (block + 1) * kPairsPerBlock);
         ActivePair active;
         for (std::size_t i = block * kPairsPerBlock; i < end; ++i) {
-          if (!activate(pairs[i], points, rest, activation_of(pairs[i]), active)) continue;
-          active.friction = friction_of(pairs[i]);
+          const NearPair& pair = pairs[i];
+          const Activation activation = activation_of(pair);
+          if (pair.distance - closing_bound(pair, moved_) > kSurely * activation.distance) continue;
+          if (!activate(pair, points, rest, activation, active)) continue;
+          active.friction = friction_of(pair);
           active_blocks_[block].push_back(active);
         }
       },
@@ -228,20 +252,14 @@ void Contact::find_active(const Positions& x) {
   const Points points{x, obstacle_now_};
   const Stopwatch watch;
   if (near_.cover(points, points)) report_.cull_ms += watch.elapsed_ms();
-  const std::vector<NearPair>& pairs = near_.near(points).pairs;
+  const PairList& near = near_.near(points);
   if (listed_ != near_.generation()) bodies_.list(x, slack_);
   listed_ = near_.generation();
   active_.clear();
-  find_active_pairs(pairs, points);
+  find_active_pairs(near, points);
   bodies_.activate(x, active_);
   report_.pairs = static_cast<int>(active_.size());
   report_.candidates = static_cast<int>(near_.candidates().pairs.size());
-}
-
-void Contact::add_to_gradient(const collision::PairVertices& vertices, int count,
-                              const std::array<Vec3, 4>& forces, Positions& gradient) const {
-  for (std::size_t i = 0; i < at(count); ++i)
-    if (!is_held(vertices[i])) gradient.row(vertices[i]) += forces[i].transpose();
 }
 
 double Contact::evaluate(const Positions& x, Positions& gradient) {
@@ -250,7 +268,9 @@ double Contact::evaluate(const Positions& x, Positions& gradient) {
   double energy = 0;
   for (const ActivePair& pair : active_) {
     energy += pair.energy;
-    add_to_gradient(pair.vertices, pair.count, pair.gradient, gradient);
+    for (std::size_t k = 0; k < at(pair.count); ++k)
+      if (!is_held_(pair.vertices[k]))
+        gradient.row(pair.vertices[k]) += pair.gradient[k].transpose();
   }
   if (!sliding_.empty()) energy += add_friction(x, gradient);
   report_.narrow_ms += watch.elapsed_ms();
@@ -284,42 +304,47 @@ Vec3 Contact::slid(const FrictionPair& pair, const Points& points) const {
 double Contact::add_friction(const Positions& x, Positions& gradient) {
   const Points points{x, obstacle_now_};
   const double slip = options_.slip_speed * options_.h;
-  double energy = 0;
-  for (FrictionPair& pair : sliding_) {
+  parallel_for(sliding_.size(), [&](std::size_t i) {
+    FrictionPair& pair = sliding_[i];
     const Vec3 way = slid(pair, points);
     const FrictionValue f = smoothed_friction(way.norm(), slip);
     pair.force_ratio = f.force_ratio;
-    energy += pair.limit * f.energy;
-    std::array<Vec3, 4> forces;
+    pair.energy = pair.limit * f.energy;
+    pair.force = pair.limit * f.force_ratio * way;
+  });
+  double energy = 0;
+  for (const FrictionPair& pair : sliding_) {
+    energy += pair.energy;
     for (std::size_t k = 0; k < at(pair.count); ++k)
-      forces[k] = pair.limit * f.force_ratio * pair.beta[k] * way;
-    add_to_gradient(pair.vertices, pair.count, forces, gradient);
+      if (!is_held_(pair.vertices[k]))
+        gradient.row(pair.vertices[k]) += pair.beta[k] * pair.force.transpose();
   }
   return energy;
 }
 
-void Contact::add_block(const collision::PairVertices& vertices, int count,
-                        const std::array<double, 4>& beta, const Mat3& stiffness,
-                        std::vector<model::ContactBlock>& blocks) const {
+model::ContactBlock Contact::block(const collision::PairVertices& vertices, int count,
+                                   const std::array<double, 4>& beta, const Mat3& stiffness) const {
   model::ContactBlock block{{}, 0, {}, stiffness};
   for (std::size_t k = 0; k < at(count); ++k) {
-    if (is_held(vertices[k])) continue;
+    if (is_held_(vertices[k])) continue;
     block.vertices[at(block.count)] = vertices[k];
     block.beta[at(block.count++)] = beta[k];
   }
-  if (block.count > 0) blocks.push_back(block);
+  return block;
 }
 
 void Contact::hessian(std::vector<model::ContactBlock>& blocks) const {
-  blocks.clear();
-  for (const ActivePair& pair : active_)
-    add_block(pair.vertices, pair.count, pair.beta,
-              pair.curvature * pair.normal * pair.normal.transpose(), blocks);
-  for (const FrictionPair& pair : sliding_)
-    add_block(
-        pair.vertices, pair.count, pair.beta,
-        pair.limit * pair.force_ratio * (Mat3::Identity() - pair.normal * pair.normal.transpose()),
-        blocks);
+  blocks.resize(active_.size() + sliding_.size());
+  parallel_for(active_.size(), [&](std::size_t i) {
+    const ActivePair& p = active_[i];
+    blocks[i] = block(p.vertices, p.count, p.beta, p.curvature * p.normal * p.normal.transpose());
+  });
+  parallel_for(sliding_.size(), [&](std::size_t i) {
+    const FrictionPair& p = sliding_[i];
+    blocks[active_.size() + i] =
+        block(p.vertices, p.count, p.beta,
+              p.limit * p.force_ratio * (Mat3::Identity() - p.normal * p.normal.transpose()));
+  });
 }
 
 void Contact::add_stiffness(const collision::PairVertices& vertices, int count,
@@ -328,10 +353,10 @@ void Contact::add_stiffness(const collision::PairVertices& vertices, int count,
                             model::ContactStiffness& stiffness) const {
   double sum = 0;  // of |beta| over what moves: |sum beta u|^2 <= sum |beta| sum |beta| |u|^2
   for (std::size_t k = 0; k < at(count); ++k)
-    if (!is_held(vertices[k])) sum += std::abs(beta[k]);
+    if (!is_held_(vertices[k])) sum += std::abs(beta[k]);
   for (std::size_t k = 0; k < at(count); ++k) {
     const int v = vertices[k];
-    if (is_held(v)) continue;
+    if (is_held_(v)) continue;
     const double share = sum * std::abs(beta[k]);
     const double aligned = normals.row(v).dot(normal.transpose());
     const double along = aligned * aligned;

@@ -12,6 +12,8 @@
 #include <piecework/collision/surface.hpp>
 #include <piecework/contact/activation.hpp>
 #include <piecework/contact/bodies.hpp>
+#include <piecework/contact/held.hpp>
+#include <piecework/contact/move_filter.hpp>
 #include <piecework/contact/near_pairs.hpp>
 #include <piecework/contact/pair_contacts.hpp>
 #include <piecework/model/constraints.hpp>
@@ -83,53 +85,29 @@ class Contact final : public model::ContactTerms {
   [[nodiscard]] const model::ContactReport& report() const override { return report_; }
 
  private:
-  /// Parts of their ways that what is held can go.
-  struct HeldWay {
-    double least = 1, most = 1;
-  };
-  struct Hit {
-    std::size_t pair;
-    double time;
-  };
-
-  /// Shortens the way from the points `from` to `to` and obstacles_end; returns how far
-  /// what is held can go.
-  HeldWay shorten(const Points& from, Positions& to, Positions& obstacles);
-  [[nodiscard]] HeldWay held_way() const;
-  void note_held(const HeldWay& held);
-  /// \param moved  PairList::moved(from)
-  void find_hits(const PairList& list, const std::vector<double>& moved, const Points& from,
-                 const Points& to, bool first);
-  void take_scales();
-  void lower_scale(int vertex, double scale);
-  void go(const Points& from, Positions& to, Positions& obstacles);
+  /// Shortens the way from `from` to {to, obstacles} so that nothing meets on it.
+  Shortening shorten(const Points& from, Positions& to, Positions& obstacles);
   /// Takes vertices in x along with what is held, moves, and is near them; `obstacles` are at the
   /// end of the way.
-  void carry(const Points& from, Positions& x, const Positions& obstacles);
-  [[nodiscard]] int held_element(const NearPair& pair) const;
-  /// For each vertex of cloth the candidate pair with the nearest held element, or -1.
-  [[nodiscard]] std::vector<int> nearest_held(const std::vector<NearPair>& pairs,
-                                              const Points& x) const;
+  void carry_along(const Points& from, Positions& x, const Positions& obstacles);
+  void note_held(const Shortening& way);
   /// Pins or obstacles move in this step.
   [[nodiscard]] bool held_moves(const Positions& x) const;
-  [[nodiscard]] bool is_held(int v) const;
   void find_active(const Positions& x);
-  void find_active_pairs(std::span<const NearPair> pairs, const Points& points);
+  void find_active_pairs(const PairList& list, const Points& points);
   /// Contact distance and friction of a pair.
   [[nodiscard]] Activation activation_of(const NearPair& pair) const;
   [[nodiscard]] double friction_of(const NearPair& pair) const;
   /// How far a pair has slid since the step began, m.
   [[nodiscard]] Vec3 slid(const FrictionPair& pair, const Points& points) const;
   double add_friction(const Positions& x, Positions& gradient);
-  void add_block(const collision::PairVertices& vertices, int count,
-                 const std::array<double, 4>& beta, const Mat3& stiffness,
-                 std::vector<model::ContactBlock>& blocks) const;
+  [[nodiscard]] model::ContactBlock block(const collision::PairVertices& vertices, int count,
+                                          const std::array<double, 4>& beta,
+                                          const Mat3& stiffness) const;
   void add_stiffness(const collision::PairVertices& vertices, int count,
                      const std::array<double, 4>& beta, const Vec3& normal, double pressing,
                      double sliding, const Positions& normals,
                      model::ContactStiffness& stiffness) const;
-  void add_to_gradient(const collision::PairVertices& vertices, int count,
-                       const std::array<Vec3, 4>& forces, Positions& gradient) const;
 
   const model::ClothModel& model_;
   ContactOptions options_;
@@ -137,11 +115,13 @@ class Contact final : public model::ContactTerms {
   Bodies bodies_;
   double slack_;  ///< how far vertices may move until lists are made anew, m
   NearPairs near_;
+  MoveFilter filter_;
   int listed_ = -1;  ///< generation of near_ for which bodies were listed
   Positions rest_obstacles_;
 
   // Of the step.
   const model::StepProblem* problem_ = nullptr;
+  Held is_held_;
   double end_time_ = 0;
   Positions obstacle_begin_, obstacle_end_, obstacle_now_;
   Positions obstacle_before_;  ///< before the last start()
@@ -153,14 +133,7 @@ class Contact final : public model::ContactTerms {
   std::vector<std::vector<ActivePair>> active_blocks_;
   std::vector<FrictionPair> sliding_;  ///< its force_ratio is of the last evaluate()
   bool has_friction_;
-
-  // Of shorten().
-  Positions way_, obstacle_way_;
-  std::vector<double> scale_, next_scale_;
-  std::vector<char> changed_;
-  std::vector<double> moved_, own_way_;
-  std::vector<Hit> hits_;
-  std::vector<std::vector<Hit>> hit_blocks_;
+  std::vector<double> moved_;  ///< since near pairs were listed, m
 };
 
 }  // namespace piecework::contact

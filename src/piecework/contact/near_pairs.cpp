@@ -125,12 +125,8 @@ const PairList& NearPairs::near(const Points& x) {
         const std::size_t end = std::min(all.size(), (block + 1) * kPairsPerBlock);
         for (std::size_t i = block * kPairsPerBlock; i < end; ++i) {
           NearPair pair = all[i];
-          const auto& v = pair.vertices;
-          if (pair.distance - closing_bound(pair.kind, moved_[at(v[0])], moved_[at(v[1])],
-                                            moved_[at(v[2])], moved_[at(v[3])]) >=
-              within)
-            continue;
-          pair.distance = std::sqrt(collision::closest(pair.kind, x(v)).distance_sq);
+          if (pair.distance - closing_bound(pair, moved_) >= within) continue;
+          pair.distance = std::sqrt(collision::closest(pair.kind, x(pair.vertices)).distance_sq);
           if (pair.distance < within) blocks_[block].push_back(pair);
         }
       },

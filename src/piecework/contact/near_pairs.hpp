@@ -80,6 +80,12 @@ inline double closing_bound(collision::PairKind kind, double a, double b, double
                                                      : std::max(a, b) + std::max(c, d);
 }
 
+/// The same with the motion of every vertex.
+inline double closing_bound(const NearPair& pair, const std::vector<double>& moved) {
+  const auto of = [&](std::size_t k) { return moved[static_cast<std::size_t>(pair.vertices[k])]; };
+  return closing_bound(pair.kind, of(0), of(1), of(2), of(3));
+}
+
 /// A list of near pairs that stays complete while nothing moves far (a Verlet list): valid within
 /// `slack` of where it was made.
 class NearPairs {

@@ -36,9 +36,12 @@ struct FrictionPair {
   int count;
   std::array<double, 4> beta;
   Vec3 normal;
-  double limit;            ///< mu times the pressure, N
-  Vec3 start;              ///< where the first closest point was relative to the second, m
-  double force_ratio = 0;  ///< f1(y) / y where the pair is now, 1/m
+  double limit;  ///< mu times the pressure, N
+  Vec3 start;    ///< where the first closest point was relative to the second, m
+  // Where the pair is now.
+  double force_ratio = 0;     ///< f1(y) / y, 1/m
+  double energy = 0;          ///< J
+  Vec3 force = Vec3::Zero();  ///< gradient by the first closest point, N
 };
 
 }  // namespace piecework::contact

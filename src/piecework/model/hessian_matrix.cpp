@@ -71,8 +71,7 @@ void HessianMatrix::set_pattern(const Reduction& reduction, SparseMatrix system)
                  {static_cast<std::int64_t>(i), c.coefficient[a] * c.coefficient[b]}, additions);
   }
   hinge_uses_ = sorted(additions);
-  blocks_.resize(static_cast<std::size_t>(system_.nonZeros()));
-  make_scalar_pattern();
+  scalars_.resize(0, 0);
 }
 
 Mat3 HessianMatrix::gathered(std::size_t k) const {
@@ -90,7 +89,7 @@ Mat3 HessianMatrix::gathered(std::size_t k) const {
   return block;
 }
 
-void HessianMatrix::assemble(const Positions& x, const StepProblem& problem, HessianForm form) {
+void HessianMatrix::soften(const Positions& x, const StepProblem& problem, HessianForm form) {
   parallel_for(stretch_.size(), [&](std::size_t t) {
     const StretchConstraint& c = model_.stretch[t];
     const Mat32 F = deformation_gradient(c, x);
@@ -102,15 +101,22 @@ void HessianMatrix::assemble(const Positions& x, const StepProblem& problem, Hes
     const auto& c = model_.bend[static_cast<std::size_t>(curved_[i])];
     bend_[i] = bend_softening(c, x, form);
   });
-  parallel_for(blocks_.size(), [&](std::size_t k) { blocks_[k] = gathered(k); });
-  rounded_.clear();
 }
 
-void HessianMatrix::multiply_rounded(const Positions& x, Positions& y) {
-  if (rounded_.empty()) {
-    rounded_.resize(blocks_.size());
-    parallel_for(blocks_.size(), [&](std::size_t k) { rounded_[k] = blocks_[k].cast<float>(); });
-  }
+void HessianMatrix::assemble(const Positions& x, const StepProblem& problem, HessianForm form) {
+  soften(x, problem, form);
+  blocks_.resize(static_cast<std::size_t>(system_.nonZeros()));
+  parallel_for(blocks_.size(), [&](std::size_t k) { blocks_[k] = gathered(k); });
+}
+
+void HessianMatrix::assemble_rounded(const Positions& x, const StepProblem& problem,
+                                     HessianForm form) {
+  soften(x, problem, form);
+  rounded_.resize(static_cast<std::size_t>(system_.nonZeros()));
+  parallel_for(rounded_.size(), [&](std::size_t k) { rounded_[k] = gathered(k).cast<float>(); });
+}
+
+void HessianMatrix::multiply_rounded(const Positions& x, Positions& y) const {
   y.resize(count(), 3);
   const int* begin = system_.outerIndexPtr();
   const int* row = system_.innerIndexPtr();
@@ -157,6 +163,8 @@ void HessianMatrix::make_scalar_pattern() {
 }
 
 const SparseMatrix& HessianMatrix::scalars() {
+  blocks_.resize(static_cast<std::size_t>(system_.nonZeros()));  // the pattern alone may be wanted
+  if (scalars_.rows() == 0) make_scalar_pattern();
   const int* begin = system_.outerIndexPtr();
   const int* row = system_.innerIndexPtr();
   parallel_for(static_cast<std::size_t>(count()), [&](std::size_t column) {

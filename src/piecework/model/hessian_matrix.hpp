@@ -29,6 +29,10 @@ class HessianMatrix {
   /// Evaluates at x (|V| x 3, m).
   void assemble(const Positions& x, const StepProblem& problem, HessianForm form);
 
+  /// The same for multiply_rounded() only, with blocks in 32 bits: half the memory to write and to
+  /// read.
+  void assemble_rounded(const Positions& x, const StepProblem& problem, HessianForm form);
+
   /// Number of block rows, n_f.
   [[nodiscard]] int count() const { return static_cast<int>(system_.cols()); }
   /// K~: its pattern is the pattern of the blocks, both triangles stored.
@@ -36,11 +40,11 @@ class HessianMatrix {
   /// Block k belongs to entry k of system(), column by column.
   [[nodiscard]] const Mat3& block(int k) const { return blocks_[static_cast<std::size_t>(k)]; }
 
-  /// y = H x; both n_f x 3.
+  /// y = H x; both n_f x 3. After assemble().
   void multiply(const Positions& x, Positions& y) const;
 
-  /// The same with blocks rounded to 32 bits: half the memory to read.
-  void multiply_rounded(const Positions& x, Positions& y);
+  /// The same after assemble_rounded().
+  void multiply_rounded(const Positions& x, Positions& y) const;
 
   /// The blocks as 3 n_f x 3 n_f scalars, lower triangle: row 3 i + c is coordinate c of unknown i.
   /// The reference is valid until the next call; its pattern stays as it is until set_pattern().
@@ -67,6 +71,7 @@ class HessianMatrix {
                 std::vector<Addition>& additions) const;
   [[nodiscard]] Uses sorted(const std::vector<Addition>& additions) const;
   void make_scalar_pattern();
+  void soften(const Positions& x, const StepProblem& problem, HessianForm form);
   [[nodiscard]] Mat3 gathered(std::size_t k) const;
 
   const ClothModel& model_;
@@ -76,7 +81,7 @@ class HessianMatrix {
   std::vector<StretchSoftening> stretch_;  ///< per triangle
   std::vector<Mat3> bend_;                 ///< per curved hinge
   std::vector<Mat3> blocks_;
-  std::vector<Eigen::Matrix3f> rounded_;  ///< of blocks_; empty: not rounded yet
+  std::vector<Eigen::Matrix3f> rounded_;
   SparseMatrix scalars_;
 };
 

@@ -84,6 +84,7 @@ class DdPd final : public model::Minimizer {
   [[nodiscard]] bool is_acceptable(double slope, const Positions& moved, double scale);
   /// now_ <- trial_; the way there was scale times `moved`, the way wanted step d_.
   void accept(const Positions& moved, double scale, double step, model::StepReport& report);
+  double lengthen(const model::StepProblem& problem, double slope, model::StepReport& report);
   bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
@@ -122,6 +123,7 @@ class DdPd final : public model::Minimizer {
   int renewals_left_ = 0;     ///< of friction
   int held_attempts_ = 0;     ///< left
   Point now_, trial_;
+  Point shorter_;       ///< while lengthen() tries more
   Positions gradient_;  ///< |V| x 3
   Positions d_;         ///< n_f x 3
 };

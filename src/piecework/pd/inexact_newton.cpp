@@ -18,19 +18,40 @@ double longest(const Positions& d) {
   }));
 }
 
-/// a += factor b.
-void add(Positions& a, double factor, const Positions& b) {
-  parallel_for(static_cast<std::size_t>(a.rows()), [&](std::size_t i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    a.row(row) += factor * b.row(row);
+/// Numbers per task.
+constexpr std::size_t kChunk = 4096;
+
+/// Calls body(begin, size) for parts of vectors as long as a.
+template <class Body>
+void for_chunks(const Positions& a, const Body& body) {
+  const auto size = static_cast<std::size_t>(a.size());
+  parallel_for((size + kChunk - 1) / kChunk,
+               [&](std::size_t c) {
+                 body(static_cast<Eigen::Index>(c * kChunk),
+                      static_cast<Eigen::Index>(std::min(kChunk, size - c * kChunk)));
+               },
+               1);
+}
+
+Eigen::Map<Eigen::ArrayXd> part(Positions& a, Eigen::Index begin, Eigen::Index size) {
+  return {a.data() + begin, size};
+}
+Eigen::Map<const Eigen::ArrayXd> part(const Positions& a, Eigen::Index begin, Eigen::Index size) {
+  return {a.data() + begin, size};
+}
+
+/// d += step p and r -= step q.
+void advance(double step, const Positions& p, const Positions& q, Positions& d, Positions& r) {
+  for_chunks(d, [&](Eigen::Index begin, Eigen::Index size) {
+    part(d, begin, size) += step * part(p, begin, size);
+    part(r, begin, size) -= step * part(q, begin, size);
   });
 }
 
 /// a = b + factor a.
 void add_onto(Positions& a, double factor, const Positions& b) {
-  parallel_for(static_cast<std::size_t>(a.rows()), [&](std::size_t i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    a.row(row) = b.row(row) + factor * a.row(row);
+  for_chunks(a, [&](Eigen::Index begin, Eigen::Index size) {
+    part(a, begin, size) = part(b, begin, size) + factor * part(a, begin, size);
   });
 }
 
@@ -42,33 +63,15 @@ void InexactNewton::assemble(const Positions& x, const model::StepProblem& probl
     reduction_ = &metric.reduction();
     hessian_.set_pattern(*reduction_, reduction_->system(metric.K()));
   }
-  hessian_.assemble(x, problem, model::HessianForm::Projected);
+  hessian_.assemble_rounded(x, problem, model::HessianForm::Projected);
   blocks_.clear();
   if (contact) contact->hessian(blocks_);
-}
-
-void InexactNewton::add_contact(const Positions& d, Positions& product) {
-  moved_.setZero(model_.num_vertices(), 3);
-  reduction_->advance(moved_, 1, d, force_);  // T_f d
-  std::swap(moved_, force_);
-  force_.setZero(model_.num_vertices(), 3);
-  for (const model::ContactBlock& block : blocks_) {
-    Vec3 relative = Vec3::Zero();
-    for (int k = 0; k < block.count; ++k)
-      relative += block.beta[static_cast<std::size_t>(k)] *
-                  moved_.row(block.vertices[static_cast<std::size_t>(k)]).transpose();
-    const Eigen::RowVector3d force = (block.stiffness * relative).transpose();
-    for (int k = 0; k < block.count; ++k)
-      force_.row(block.vertices[static_cast<std::size_t>(k)]) +=
-          block.beta[static_cast<std::size_t>(k)] * force;
-  }
-  reduction_->gather(force_, folded_);
-  add(product, 1, folded_);
+  contact_.take(blocks_, model_, *reduction_);
 }
 
 void InexactNewton::multiply(const Positions& d, Positions& product) {
   hessian_.multiply_rounded(d, product);
-  if (!blocks_.empty()) add_contact(d, product);
+  contact_.add(d, product);
 }
 
 /// Tighter as the gradient falls faster, which says that the second derivative is believed to the
@@ -98,8 +101,7 @@ int InexactNewton::solve(const Positions& g, double small, Metric& metric, Posit
     const double curvature = dot(direction_, product_);
     if (!(curvature > 0)) break;  // only rounding is left
     const double step = norm_sq / curvature;
-    add(d, step, direction_);
-    add(residual_, -step, product_);
+    advance(step, direction_, product_, d, residual_);
     ++iterations;
     metric.apply(residual_, preconditioned_);
     const double next_sq = dot(residual_, preconditioned_);

@@ -10,6 +10,7 @@
 
 #include <piecework/model/contact_terms.hpp>
 #include <piecework/model/hessian_matrix.hpp>
+#include <piecework/pd/contact_product.hpp>
 #include <piecework/pd/metric.hpp>
 
 namespace piecework::pd {
@@ -43,15 +44,14 @@ class InexactNewton {
 
   double forcing(double norm_sq);
   void multiply(const Positions& d, Positions& product);
-  void add_contact(const Positions& d, Positions& product);
 
   model::HessianMatrix hessian_;
   const model::ClothModel& model_;
   const model::Reduction* reduction_ = nullptr;  ///< the one that hessian_ has its pattern from
   std::vector<model::ContactBlock> blocks_;
+  ContactProduct contact_;
   double last_norm_sq_ = 0;  ///< of the gradient in the metric, at the last solve(); 0: none
   Positions residual_, preconditioned_, direction_, product_;
-  Positions moved_, force_, folded_;  ///< |V| x 3, |V| x 3, n_f x 3: products with contact
 };
 
 }  // namespace piecework::pd

@@ -165,31 +165,35 @@ void Metric::solve_stretch(const Positions& g, Positions& d) {
   d = columns_;
 }
 
-/// S: what touches has no say along its normal.
-void Metric::remove_normals(Positions& rows) const {
+/// across = S g and along = N^T g: what touches has no say along its normal.
+void Metric::split(const Positions& g, Positions& across, Eigen::VectorXd& along) const {
   const auto N = normal_->normals();
-  parallel_for(static_cast<std::size_t>(rows.rows()), [&](std::size_t i) {
+  const bool touching = along_.size() > 0;
+  if (touching) across.resize(g.rows(), 3);
+  along.resize(g.rows());
+  parallel_for(static_cast<std::size_t>(g.rows()), [&](std::size_t i) {
     const auto row = static_cast<Eigen::Index>(i);
-    if (along_[row] > 0) rows.row(row) -= N.row(row).dot(rows.row(row)) * N.row(row);
+    along[row] = N.row(row).dot(g.row(row));
+    if (touching) across.row(row) = g.row(row) - removed(row, along[row]) * N.row(row);
+  });
+}
+
+/// d = S d + N along.
+void Metric::join(const Eigen::VectorXd& along, Positions& d) const {
+  const auto N = normal_->normals();
+  const bool touching = along_.size() > 0;
+  parallel_for(static_cast<std::size_t>(d.rows()), [&](std::size_t i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const double own = touching ? removed(row, N.row(row).dot(d.row(row))) : 0.0;
+    d.row(row) += (along[row] - own) * N.row(row);
   });
 }
 
 void Metric::apply(const Positions& g, Positions& d) {
   d.resize(g.rows(), 3);
   if (!normals_in_use_) return solve_stretch(g, d);
-  const auto N = normal_->normals();
-  const bool touching = along_.size() > 0;
-  if (touching) {
-    tangential_ = g;
-    remove_normals(tangential_);
-  }
-  const Positions& across = touching ? tangential_ : g;
-  const auto count = static_cast<std::size_t>(g.rows());
-  along_normal_.resize(g.rows());
-  parallel_for(count, [&](std::size_t i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    along_normal_[row] = N.row(row).dot(g.row(row));
-  });
+  split(g, tangential_, along_normal_);
+  const Positions& across = along_.size() > 0 ? tangential_ : g;
   if (global::TreeSolver* tree = stretch_tree()) {
     (void)tree->solve_with(across.data(), d.data(), 3, normal_solver_, along_normal_.data(),
                            along_normal_.data(), 1, 3, 1);
@@ -197,11 +201,7 @@ void Metric::apply(const Positions& g, Positions& d) {
     solve_stretch(across, d);
     (void)normal_solver_.solve(along_normal_.data(), along_normal_.data(), 1, 1, 1);
   }
-  if (touching) remove_normals(d);
-  parallel_for(count, [&](std::size_t i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    d.row(row) += along_normal_[row] * N.row(row);
-  });
+  join(along_normal_, d);
 }
 
 }  // namespace piecework::pd

@@ -68,7 +68,12 @@ class Metric {
   void factor_anew(const Eigen::VectorXd& D);
   /// Makes K~ + D ready to be solved, unless D is little beside it.
   bool factor_with(const Eigen::VectorXd& D);
-  void remove_normals(Positions& rows) const;
+  void split(const Positions& g, Positions& across, Eigen::VectorXd& along) const;
+  void join(const Eigen::VectorXd& along, Positions& d) const;
+  /// What S takes off an unknown that has `along` in the direction of its normal.
+  [[nodiscard]] double removed(Eigen::Index unknown, double along) const {
+    return along_[unknown] > 0 ? along : 0.0;
+  }
   /// The tree of K~ + D; null: it is not solved by one.
   [[nodiscard]] global::TreeSolver* stretch_tree();
 
