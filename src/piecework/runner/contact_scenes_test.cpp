@@ -85,5 +85,33 @@ TEST(GarmentOnAvatar, TouchesAndNothingPassesThrough) {
   EXPECT_GT(touching_pairs(scene, 6), 0);
 }
 
+// The corner cases of [Erleben 2018]: spikes, wedges, cliffs, cracks, holes and internal edges,
+// half a metre large, under a sheet that falls onto them.
+TEST(SharpColliders, TouchAndNothingPassesThrough) {
+  const std::string folder = std::string(PIECEWORK_SHARED_DATA) + "/colliders/erleben/";
+  if (!fs::exists(folder)) GTEST_SKIP() << "no shared data here";
+  struct Solid {
+    const char* name;
+    double units, x, top, z;  ///< m; where the middle of its top is then
+  };
+  for (const Solid& solid :
+       {Solid{"cliff", 0.333333, 0, 0.1667, 0}, Solid{"crack", 0.125, 0, 0.0625, 0},
+        Solid{"hole", 0.25, 0, 0.125, 0}, Solid{"internal_edges", 0.25, 0, 0.125, 0},
+        Solid{"spike", 0.166667, 0, 0.5001, 0}, Solid{"wedge", 0.166667, 0, 0.5001, 0}}) {
+    SCOPED_TRACE(solid.name);
+    const scene::Scene scene = scene::parse_scene(
+        fmt::format(R"({{"self_collision": true, "friction": 0.3, "solver": {{"domains": 4}},
+          "materials": {{"m": {{"density": 0.3, "stretching": 300, "bending": 1e-5}}}},
+          "cloths": [{{"material": "m", "translate": [{}, {}, {}], "mesh": {{"generator": "sheet",
+            "width": 0.8, "height": 0.8, "columns": 20, "rows": 20}}}}],
+          "colliders": [{{"name": "solid", "shape": "mesh",
+            "mesh": {{"file": "{}{}.obj", "units": {}, "repair": true}}}}]}})",
+                    solid.x - 0.4, solid.top + 0.005, solid.z - 0.4, folder, solid.name,
+                    solid.units),
+        "solid.json");
+    EXPECT_GT(touching_pairs(scene, 20), 0);
+  }
+}
+
 }  // namespace
 }  // namespace piecework::runner
