@@ -78,10 +78,9 @@ void add_to_traces(RecordedRun run) {
 }
 
 double total_seconds(const Records& records) {
-  return 1e-3 * std::accumulate(records.begin(), records.end(), 0.0,
-                                [](double sum, const StepRecord& r) {
-                                  return sum + r.report.step_ms;
-                                });
+  return 1e-3 *
+         std::accumulate(records.begin(), records.end(), 0.0,
+                         [](double sum, const StepRecord& r) { return sum + r.report.step_ms; });
 }
 
 void write(benchmark::State& state, const Records& records) {
@@ -317,8 +316,7 @@ void add_drapes() {
     add_drape(256, row("1e-2", 1, 8, 4));
     return;
   }
-  for (const char* tolerance : {"1e-1", "1e-2", "1e-3"})
-    add_drape(2500, row(tolerance, 1, 60, 10));
+  for (const char* tolerance : {"1e-1", "1e-2", "1e-3"}) add_drape(2500, row(tolerance, 1, 60, 10));
   add_drape(2500, row("1e-2", 2, 60, 0));
   for (const int threads : {1, 2})  // its beginning: all of it takes many minutes
     add_drape(19881, row("1e-2", threads, 24, 0));

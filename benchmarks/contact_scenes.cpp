@@ -72,11 +72,8 @@ scene::Scene support_scene(Support support, int side, double friction) {
   if (support == Support::Rigid) {
     constexpr double radius = 0.06;
     scene.cloths = {sheet("cloth", 0.6, side, 0.13, radius + 0.7e-3)};
-    scene.colliders = {{.name = "rod",
-                        .shape = "capsule",
-                        .radius = radius,
-                        .from = {0, 0, -1},
-                        .to = {0, 0, 1}}};
+    scene.colliders = {
+        {.name = "rod", .shape = "capsule", .radius = radius, .from = {0, 0, -1}, .to = {0, 0, 1}}};
     return scene;
   }
   scene.gravity = sloping_gravity();

@@ -30,8 +30,8 @@ double way(scene::Scene scene) {
   const auto integrator = runner::make_integrator(*world);
   model::State state = integrator->initial_state(world->part_velocity);
   int pairs = 0;
-  const auto first = world->model.start.topRows(scene.cloths[0].mesh.rows *
-                                                scene.cloths[0].mesh.columns);
+  const auto first =
+      world->model.start.topRows(scene.cloths[0].mesh.rows * scene.cloths[0].mesh.columns);
   for (int k = 0; k < 30; ++k) {
     const auto report = integrator->step(state);
     if (report.contact) pairs = report.contact->pairs;
@@ -50,7 +50,8 @@ TEST(ContactScenes, WithoutContactNothingTouches) {
   const auto world =
       runner::build_world(without_contact(support_scene(Support::Rigid, 8, kSlides)));
   EXPECT_EQ(runner::make_contact(*world), nullptr);
-  const auto two = runner::build_world(without_contact(support_scene(Support::Elastic, 8, kSlides)));
+  const auto two =
+      runner::build_world(without_contact(support_scene(Support::Elastic, 8, kSlides)));
   EXPECT_EQ(runner::make_contact(*two), nullptr);
 }
 

@@ -47,8 +47,8 @@ struct RecordedRun {
   std::vector<StepRecord> records;
 };
 
-/// {"schema": "piecework.step_records/1", "columns": [...], "runs": [{..., "points": [[...], ...]}]};
-/// what is not finite is null.
+/// {"schema": "piecework.step_records/1", "columns": [...], "runs": [{..., "points": [[...],
+/// ...]}]}; what is not finite is null.
 std::string records_json(const std::vector<RecordedRun>& runs);
 
 }  // namespace piecework::bench

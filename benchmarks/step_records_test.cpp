@@ -23,23 +23,34 @@ StepRecord record(int step, double ms, int pairs) {
 }
 
 /// Times grow as the square of the pairs.
-std::vector<StepRecord> three() {
-  return {record(1, 4, 20), record(2, 1, 10), record(3, 16, 40)};
-}
+std::vector<StepRecord> three() { return {record(1, 4, 20), record(2, 1, 10), record(3, 16, 40)}; }
 
 TEST(StepRecords, SummaryIsWhatOneCountsByHand) {
   auto records = three();
   records[0].true_error = 0.5;
   records[2].true_error = 0.1;
   const auto result = summary(records);
-  const std::map<std::string, double> expected{
-      {"steps", 3},           {"step_ms", 4},          {"step_ms_mean", 7},
-      {"max_over_median", 4}, {"cpu_ms", 8},           {"cpu_ms_mean", 14},
-      {"iterations", 20},     {"iterations_mean", 20}, {"iterations_max", 30},
-      {"solves", 3},          {"cull_share", 0.1},     {"narrow_share", 0.2},
-      {"check_share", 0},     {"pairs", 20},           {"pairs_max", 40},
-      {"converged", 2.0 / 3}, {"interpenetrations", 0}, {"growth_by_pairs", 2},
-      {"true_errors", 2},     {"true_error", 0.3},     {"true_error_max", 0.5}};
+  const std::map<std::string, double> expected{{"steps", 3},
+                                               {"step_ms", 4},
+                                               {"step_ms_mean", 7},
+                                               {"max_over_median", 4},
+                                               {"cpu_ms", 8},
+                                               {"cpu_ms_mean", 14},
+                                               {"iterations", 20},
+                                               {"iterations_mean", 20},
+                                               {"iterations_max", 30},
+                                               {"solves", 3},
+                                               {"cull_share", 0.1},
+                                               {"narrow_share", 0.2},
+                                               {"check_share", 0},
+                                               {"pairs", 20},
+                                               {"pairs_max", 40},
+                                               {"converged", 2.0 / 3},
+                                               {"interpenetrations", 0},
+                                               {"growth_by_pairs", 2},
+                                               {"true_errors", 2},
+                                               {"true_error", 0.3},
+                                               {"true_error_max", 0.5}};
   for (const auto& [name, value] : expected) EXPECT_NEAR(result.at(name), value, 1e-9) << name;
   EXPECT_EQ(result.size(), expected.size());
 }
@@ -49,8 +60,8 @@ TEST(StepRecords, WithoutJudgedStepsThereIsNoTrueError) {
 }
 
 TEST(StepRecords, PairsThatHardlyVaryShowNoGrowth) {
-  EXPECT_FALSE(summary({record(1, 1, 10), record(2, 2, 0), record(3, 4, 20)})
-                   .contains("growth_by_pairs"));
+  EXPECT_FALSE(
+      summary({record(1, 1, 10), record(2, 2, 0), record(3, 4, 20)}).contains("growth_by_pairs"));
 }
 
 TEST(StepRecords, DefectsAreNamed) {
@@ -76,7 +87,8 @@ TEST(StepRecords, JsonHasAPointPerStep) {
 }
 
 TEST(PowerLaw, ExponentOfExactPowersAndOfNothing) {
-  const std::vector<double> x{1, 2, 5, 0, 9}, y{3, 3 * std::pow(2, 1.5), 3 * std::pow(5, 1.5), 7, 0};
+  const std::vector<double> x{1, 2, 5, 0, 9},
+      y{3, 3 * std::pow(2, 1.5), 3 * std::pow(5, 1.5), 7, 0};
   EXPECT_NEAR(power_exponent(x, y), 1.5, 1e-12) << "points without a logarithm do not count";
   const std::vector<double> same{4, 4}, other{1, 2};
   EXPECT_TRUE(std::isnan(power_exponent(same, other)));
