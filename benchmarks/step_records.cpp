@@ -109,8 +109,11 @@ std::map<std::string, double> summary(const std::vector<StepRecord>& records) {
   result["converged"] = mean(of([](const StepRecord& r) { return r.report.converged ? 1 : 0; }));
   result["interpenetrations"] =
       total(of([](const StepRecord& r) { return r.contact().interpenetrations; }));
-  if (largest(touching) >= kSpreadForGrowth * least_positive(touching))
+  if (largest(touching) >= kSpreadForGrowth * least_positive(touching)) {
     result["growth_by_pairs"] = power_exponent(touching, wall);
+    result["iteration_growth_by_pairs"] = power_exponent(
+        touching, of([](const StepRecord& r) { return step_ms(r) / iterations(r); }));
+  }
   std::vector<double> errors = of([](const StepRecord& r) { return r.true_error; });
   std::erase_if(errors, [](double error) { return std::isnan(error); });
   if (errors.empty()) return result;

@@ -25,6 +25,10 @@ StepRecord record(int step, double ms, int pairs) {
 /// Times grow as the square of the pairs.
 std::vector<StepRecord> three() { return {record(1, 4, 20), record(2, 1, 10), record(3, 16, 40)}; }
 
+/// Of 0.05, 0.4 and 16/30 ms at 10, 20 and 40 pairs, evenly spaced in logarithms: half of the last
+/// over the first.
+const double kIterationGrowth = std::log((16.0 / 30) / 0.05) / std::log(4);
+
 TEST(StepRecords, SummaryIsWhatOneCountsByHand) {
   auto records = three();
   records[0].true_error = 0.5;
@@ -48,6 +52,7 @@ TEST(StepRecords, SummaryIsWhatOneCountsByHand) {
                                                {"converged", 2.0 / 3},
                                                {"interpenetrations", 0},
                                                {"growth_by_pairs", 2},
+                                               {"iteration_growth_by_pairs", kIterationGrowth},
                                                {"true_errors", 2},
                                                {"true_error", 0.3},
                                                {"true_error_max", 0.5}};
