@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <piecework/runner/methods.hpp>
+
+#include "contact_scenes.hpp"
 #include "power_law.hpp"
 
 namespace piecework::bench {
@@ -89,6 +92,38 @@ TEST(StepRecords, JsonHasAPointPerStep) {
             R"({"family": "drape", "scene": "ball", "n": 9, "tolerance": "1e-2", "threads": 2, )"
             R"("points": [[1, 4, 8, 0.4, 0.8, 10, 20, null], [2, 1, 2, 0.1, 0.2, 20, 10, 0.25]]}]})"
             "\n");
+}
+
+/// An integrator of a small scene of contact_scenes.hpp.
+struct Small {
+  std::unique_ptr<runner::World> world;
+  std::unique_ptr<model::Integrator> integrator;
+
+  explicit Small(double tolerance) {
+    scene::Scene scene = support_scene(Support::Rigid, 6, kSticks);
+    scene.quality.tolerance = tolerance;
+    scene.quality.max_iterations = 50;
+    world = runner::build_world(scene);
+    integrator = runner::make_integrator(*world);
+  }
+};
+
+TEST(StepRecords, DistanceFromExactIsTheLargestOfAnyVertex) {
+  const Small small(1e-3), exact(1e-3);
+  model::State state = small.integrator->initial_state(small.world->part_velocity);
+  const model::State before = state;
+  const StepRecord record = take_step(*small.integrator, state);
+  EXPECT_EQ(record.step, 1);
+  EXPECT_EQ(distance_from_exact(*exact.integrator, before, state.x, 1e-2), 0);
+  state.x.row(3) += Eigen::RowVector3d(3e-3, 0, -4e-3);
+  state.x.row(7) += Eigen::RowVector3d(0, 1e-3, 0);
+  EXPECT_NEAR(distance_from_exact(*exact.integrator, before, state.x, 1e-2), 0.5, 1e-9);
+}
+
+TEST(StepRecords, WhatDoesNotConvergeIsNoMeasure) {
+  const Small small(1e-300);
+  const model::State state = small.integrator->initial_state(small.world->part_velocity);
+  EXPECT_TRUE(std::isnan(distance_from_exact(*small.integrator, state, state.x, 1)));
 }
 
 TEST(PowerLaw, ExponentOfExactPowersAndOfNothing) {

@@ -11,6 +11,7 @@ WIDTH, HEIGHT = 1200, 560
 LEFT, RIGHT, TOP, BOTTOM, GAP = 74, 24, 112, 66, 74
 # Hues that colour-blind people tell apart [Okabe, Ito].
 COLOURS = ("#D55E00", "#0072B2", "#00795A", "#A0527F", "#E69F00", "#56B4E9", "#222222")
+STICKS = math.tan(math.radians(20))  # kSlope in benchmarks/contact_scenes.hpp
 SOLIDS = {"plane": "#D55E00", "mesh": "#0072B2"}
 
 
@@ -141,18 +142,23 @@ def slope_panel(rows, edges, heading, counter, highest):
     return x_axis, y_axis, out, marks
 
 
+def law(rows):
+    """(mu, mm) of Coulomb's law, with its kink where cloth begins to stick."""
+    points = {(r.number("mu"), r.get("expected_mm")) for r in rows}
+    sliding, sticking = ([p for p in points if (p[0] < STICKS) == slides] for slides in (True, False))
+    return sorted(sliding + sticking + ([(STICKS, 0)] if sliding and sticking else []))
+
+
 def fig14(rows, context):
     """How far a sheet slides, with what Coulomb's law says, and the iterations of its steps."""
     left, right = columns()
     x_axis, y_axis, parts, marks = slope_panel(
         rows, left, "way in 30 steps, mm; line: Coulomb's law", "slid_mm",
         max(r.get("expected_mm") for r in rows))
-    law = sorted({(r.number("mu"), r.get("expected_mm")) for r in rows})
-    parts.append(polyline([(x_axis(mu), y_axis(mm)) for mu, mm in law],
+    parts.append(polyline([(x_axis(mu), y_axis(mm)) for mu, mm in law(rows)],
                           'stroke="#222" stroke-width="1.5"'))
-    sticks = math.tan(math.radians(20))
-    if sticks < x_axis.high:
-        at = x_axis(sticks)
+    if STICKS < x_axis.high:
+        at = x_axis(STICKS)
         parts.append(line(at, y_axis.start, at, y_axis.end, 'stroke="#888" stroke-dasharray="4 4"'))
         parts.append(text(at + 6, TOP + 14, "sticks", 12, "start"))
     _, _, other, other_marks = slope_panel(rows, right, "iterations per step, mean",
