@@ -25,9 +25,10 @@ BAD_SCENE, BROKEN = 2, 1  # exit codes of piecework: wrong input; --strict, or a
 ENVIRONMENT = ("cpu", "cores", "compiler", "revision")
 
 ABOUT = f"""\
-Each scene run several times with jittered starts: sheets triangulated anew, all cloths shifted sideways
-by up to {digits(1e3 * FARTHEST)} mm. After every step an independent check counts edges that pass through triangles and
-vertices inside of bodies. `bash ci/jitter.sh` makes this table."""
+Each scene run several times with jittered starts: sheets triangulated anew, all cloths shifted
+sideways by up to {digits(1e3 * FARTHEST)} mm. After every step an independent check counts edges that pass through
+triangles and vertices inside of bodies; what stays there counts in every step. `bash ci/jitter.sh`
+makes this table."""
 
 
 @dataclass

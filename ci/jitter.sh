@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Does anything pass through anything? Runs every shipped scene with contact ten times, each time a
-# little different (see jitter.py), and writes results/tables/jitter.md. Takes hours; with --coarse,
-# on meshes of half the resolution, under one. Exit code 1: something did.
+# little different (see jitter.py), and writes results/tables/jitter.md. Takes an hour or two; with
+# --coarse, on meshes of half the resolution, a quarter of one. Exit code 1: something did.
 #
 #   bash ci/jitter.sh [--coarse] [--runs N] [--threads N] [SCENE ...]
 #
