@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -19,6 +20,7 @@
 #include <piecework/mesh/generate.hpp>
 
 #include "bench.hpp"
+#include "power_law.hpp"
 
 namespace piecework::bench {
 namespace {
@@ -160,15 +162,13 @@ std::size_t size(const CandidatePairs& pairs) {
   return pairs.vertex_triangle.size() + pairs.edge_edge.size();
 }
 
-/// Slope of log(time) over log(n) through the rows of one kind that have run so far.
-double exponent(const std::string& kind, double n, double seconds) {
-  static std::map<std::string, std::map<double, double>> rows;
-  auto& points = rows[kind];
-  points[std::log(n)] = std::log(seconds);
-  double sx = 0, sy = 0, sxx = 0, sxy = 0;
-  for (const auto& [x, y] : points) sx += x, sy += y, sxx += x * x, sxy += x * y;
-  const auto m = static_cast<double>(points.size());
-  return points.size() < 2 ? 1 : (m * sxy - sx * sy) / (m * sxx - sx * sx);
+/// Growth of time by n through the rows of one kind that have run so far; NaN: of one alone.
+double growth(const std::string& kind, double n, double ms) {
+  static std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> rows;
+  auto& [sizes, times] = rows[kind];
+  sizes.push_back(n);
+  times.push_back(ms);
+  return power_exponent(sizes, times);
 }
 
 struct Times {
@@ -237,7 +237,7 @@ void broad_phase(benchmark::State& state, const std::string& kind) {
   state.counters["pairs_per_triangle"] = count / scene.num_triangles();
   state.counters["box_tests"] = static_cast<double>(broad.report().box_tests);
   state.counters["exponent"] =
-      exponent(fmt::format("{}/{}", kind, threads), static_cast<double>(n), ms);
+      growth(fmt::format("{}/{}", kind, threads), static_cast<double>(n), ms);
   if (kind == "rebuild") state.counters["refits"] = ms / median_ms(times.refit);
 }
 

@@ -13,8 +13,8 @@ source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 bash "$root/ci/build.sh" release
 cd "$root"
 names=("$@")
-[ ${#names[@]} -gt 0 ] || names=(partition local step render global contact extremes iterations
-  convergence front)
+[ ${#names[@]} -gt 0 ] || names=(partition local step render global ccd broad_phase contact contact_steps
+  extremes iterations convergence front)
 machine=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1 | tr -cs 'A-Za-z0-9' '-' | sed 's/-*$//')-$(nproc)cores
 mkdir -p "results/raw/$machine" results/tables results/figures
 
@@ -22,7 +22,7 @@ mkdir -p "results/raw/$machine" results/tables results/figures
 tables() {
   case "$1" in
     global) "$root/ci/global_tables" "$2" --out results/tables --figures results/figures ;;
-    contact | convergence)
+    contact | contact_steps | convergence)
       local traces="${2%.json}_traces.json" options=()
       [ ! -f "$traces" ] || options=(--traces "$traces")
       "$root/ci/$1_tables" "$2" --out results/tables --figures results/figures \
@@ -61,12 +61,12 @@ for name in "${names[@]}"; do
   [ -z "${FILTER:-}" ] || options+=(--benchmark_filter="$FILTER")
   traces="${raw%.json}_traces.json"
   rm -f "$traces.new"
-  [[ ! "$name" =~ ^(contact|convergence|iterations)$ ]] || options+=(--traces="$traces.new")
+  [[ ! "$name" =~ ^(contact|contact_steps|convergence|iterations)$ ]] || options+=(--traces="$traces.new")
   [ "$name" != iterations ] || options+=(--maps=results/figures/fig7.png)
   "build/release/bin/bench_$name" "${options[@]}" || status=$?
   if [ "$status" != 0 ]; then
     # The tables of these say which rows are invalid; the others' have no place for that.
-    [[ "$name $status" =~ ^(global|contact|iterations|convergence)\ $invalid_results$ ]] || exit "$status"
+    [[ "$name $status" =~ ^(global|contact|contact_steps|iterations|convergence)\ $invalid_results$ ]] || exit "$status"
     exit_code=$status
   fi
   mv "$raw.new" "$raw"
