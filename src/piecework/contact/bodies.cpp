@@ -28,14 +28,46 @@ double Bodies::distance(int body) const {
   return colliders_[at(body)].traits().thickness.value_or(activation_.distance);
 }
 
+void Bodies::pose(double time, std::vector<Eigen::Isometry3d>& poses) const {
+  poses.clear();
+  for (const auto& collider : colliders_) poses.push_back(collider.pose(time));
+}
+
 void Bodies::begin_step(double begin, double end) {
-  begin_.clear();
-  end_.clear();
-  for (const auto& collider : colliders_) {
-    begin_.push_back(collider.pose(begin));
-    end_.push_back(collider.pose(end));
+  begin_time_ = begin;
+  end_time_ = end;
+  pose(begin, begin_);
+  pose(end, end_);
+  moves_ = false;
+  for (std::size_t body = 0; body < begin_.size(); ++body)
+    if (begin_[body].matrix() != end_[body].matrix()) moves_ = true;
+  place(0);
+}
+
+void Bodies::place(double part) {
+  part_ = part;
+  pose(begin_time_ + part * (end_time_ - begin_time_), now_);
+  if (part == 1) now_ = end_;
+}
+
+void Bodies::take_back() {
+  part_ = part_before_;
+  std::swap(now_, before_);
+}
+
+bool Bodies::any_enters(const Positions& from, const std::vector<char>& held,
+                        const Positions& x) const {
+  for (int body = 0; body < static_cast<int>(colliders_.size()); ++body) {
+    const double enter = parallel_max(at(static_cast<int>(x.rows())), [&](std::size_t v) {
+      const auto inside = [&](const Positions& at_v, const Eigen::Isometry3d& pose) {
+        const Vec3 p = at_v.row(static_cast<Eigen::Index>(v)).transpose();
+        return colliders_[at(body)].signed_distance(p, pose).distance < 0;
+      };
+      return !held[v] && inside(x, now_[at(body)]) && !inside(from, before_[at(body)]) ? 1.0 : 0.0;
+    });
+    if (enter > 0) return true;
   }
-  now_ = begin_;
+  return false;
 }
 
 /// All shapes are convex, so the distance along a straight way is a convex function: Newton from
@@ -64,25 +96,28 @@ double Bodies::free_part(int body, const Vec3& from, const Vec3& way,
 /// Cutting a way short would also end its sliding: rather beside the body where it would be in it,
 /// if the way there is free.
 Vec3 Bodies::beside(int body, const Vec3& from, const Vec3& way, double part) const {
-  const auto there = colliders_[at(body)].signed_distance(from + way, end_[at(body)]);
+  const auto there = colliders_[at(body)].signed_distance(from + way, now_[at(body)]);
   const double missing = kBeside * distance(body) - there.distance;
   const Vec3 pushed = way + missing * there.normal;
-  if (free_part(body, from, pushed, end_[at(body)]) == 1) return from + pushed;
+  if (free_part(body, from, pushed, now_[at(body)]) == 1) return from + pushed;
   return from + part * way;
 }
 
-void Bodies::start(const Positions& previous, const std::vector<char>& held, Positions& x) {
-  now_ = end_;
+void Bodies::move(double part, const Positions& from, const std::vector<char>& held, Positions& x) {
+  before_ = now_;
+  part_before_ = part_;
+  place(part == 1 ? 1 : part_ + part * (1 - part_));
   for (int body = 0; body < static_cast<int>(colliders_.size()); ++body) {
-    const Eigen::Isometry3d carry = end_[at(body)] * begin_[at(body)].inverse();
+    const Eigen::Isometry3d& pose = now_[at(body)];
+    const Eigen::Isometry3d carry = pose * before_[at(body)].inverse();
     parallel_for(at(static_cast<int>(x.rows())), [&](std::size_t v) {
       if (held[v]) return;
       const auto row = static_cast<Eigen::Index>(v);
-      // In the frame of the body at its end.
-      const Vec3 from = carry * Vec3(previous.row(row).transpose());
-      const Vec3 way = x.row(row).transpose() - from;
-      const double part = free_part(body, from, way, end_[at(body)]);
-      if (part < 1) x.row(row) = beside(body, from, way, part).transpose();
+      // In the frame of the body where it is now.
+      const Vec3 begin = carry * Vec3(from.row(row).transpose());
+      const Vec3 way = x.row(row).transpose() - begin;
+      const double free = free_part(body, begin, way, pose);
+      if (free < 1) x.row(row) = beside(body, begin, way, free).transpose();
     });
   }
 }

@@ -29,13 +29,29 @@ class Bodies {
 
   [[nodiscard]] bool empty() const { return colliders_.empty(); }
 
-  /// Bodies are at their begin until start().
+  /// Bodies are where they belong at `begin`, s.
   void begin_step(double begin, double end);
 
-  /// Puts the bodies to their end and cuts the ways of vertices from where the step began (bodies
-  /// at its begin) to x short of them, seen from each body: vertices are carried along. What is
-  /// held stays. Lists are void.
-  void start(const Positions& previous, const std::vector<char>& held, Positions& x);
+  /// Moves the bodies by a part of the way that is left to their end, and cuts the ways of vertices
+  /// from `from` to x short of them, seen from each body: vertices are carried along. What is held
+  /// stays. Lists are void.
+  void move(double part, const Positions& from, const std::vector<char>& held, Positions& x);
+
+  /// As before the last move().
+  void take_back();
+
+  /// Back to the begin of the step, or on to its end, whatever is in the way.
+  void place(double part);
+
+  /// Any body moves during the step.
+  [[nodiscard]] bool move_in_step() const { return moves_; }
+  /// Part of the step's way that the bodies have gone.
+  [[nodiscard]] double part() const { return part_; }
+
+  /// A vertex that is not held is inside of a body at x and was not so at `from`, where the bodies
+  /// were before the last move().
+  [[nodiscard]] bool any_enters(const Positions& from, const std::vector<char>& held,
+                                const Positions& x) const;
 
   /// Cuts straight ways short of the bodies where they are now; true if any was.
   bool limit(const Positions& from, const std::vector<char>& held, Positions& to) const;
@@ -56,13 +72,17 @@ class Bodies {
  private:
   [[nodiscard]] double distance(int body) const;
   [[nodiscard]] Vec3 beside(int body, const Vec3& from, const Vec3& way, double part) const;
+  void pose(double time, std::vector<Eigen::Isometry3d>& poses) const;
   [[nodiscard]] double free_part(int body, const Vec3& from, const Vec3& way,
                                  const Eigen::Isometry3d& pose) const;
 
   std::span<const colliders::AnalyticCollider> colliders_;
   Activation activation_;
   std::optional<double> friction_;
-  std::vector<Eigen::Isometry3d> begin_, end_, now_;
+  double begin_time_ = 0, end_time_ = 0;
+  bool moves_ = false;
+  double part_ = 0, part_before_ = 0;
+  std::vector<Eigen::Isometry3d> begin_, end_, now_, before_;  ///< before_: the last move()
   std::vector<NearBody> near_;
   std::vector<std::vector<NearBody>> blocks_;
 };

@@ -168,7 +168,7 @@ TEST(Bodies, CarryWhatIsInTheirWay) {
   Positions previous(2, 3), x(2, 3);
   previous << 0, 1e-3, 0, 5, 1, 0;
   x = previous;
-  bodies.start(previous, {0, 0}, x);
+  bodies.move(1, previous, {0, 0}, x);
   EXPECT_GT(x(0, 1), 0.06);
   EXPECT_LT(x(0, 1), 0.061);
   EXPECT_EQ(x(1, 1), 1) << "it has not come that far";

@@ -15,6 +15,8 @@ namespace piecework::contact {
 namespace {
 
 constexpr std::size_t kPairsPerBlock = 1024;
+/// Of the way that is left: less is not tried by bodies with a closed form.
+constexpr double kLeastPart = 1.0 / 8;
 /// Bounds are rounded: what is farther than this times the contact distance is out of reach.
 constexpr double kSurely = 1.01;
 
@@ -148,52 +150,74 @@ void Contact::begin_step(const model::StepProblem& problem, double begin, double
 
 void Contact::take_back_start() {
   std::swap(obstacle_now_, obstacle_before_);
+  bodies_.place(1);
   arrived_ = true;
   report_.held_back = 0;
 }
 
-bool Contact::held_moves(const Positions& x) const {
+bool Contact::held_moves(const Positions& from, const Positions& to) const {
   if (!obstacles_.are_static()) return true;
   return parallel_max(at(model_.num_vertices()), [&](std::size_t v) {
            const auto row = static_cast<Eigen::Index>(v);
-           const bool moves = (*problem_->fixed)[v] && x.row(row) != problem_->previous->row(row);
+           const bool moves = (*problem_->fixed)[v] && to.row(row) != from.row(row);
            return moves ? 1.0 : 0.0;
          }) > 0;
 }
 
 double Contact::start(Positions& x) {
-  bodies_.start(*problem_->previous, *problem_->fixed, x);
-  listed_ = -1;
-  if (held_moves(x)) carry_along({*problem_->previous, obstacle_begin_}, x, obstacle_end_);
-  model_.sewing.follow(end_time_, x);
   std::swap(obstacle_now_, obstacle_before_);
-  obstacle_now_ = obstacle_end_;
-  const Shortening way = shorten({*problem_->previous, obstacle_begin_}, x, obstacle_now_);
-  note_held(way);
-  return way.least;
-}
-
-void Contact::note_held(const Shortening& way) {
-  arrived_ = way.least == 1;
-  report_.held_back = 1 - way.least;
+  obstacle_now_ = obstacle_begin_;
+  bodies_.place(0);
+  arrived_ = false;
+  (void)go_on(*problem_->previous, x);
+  return 1 - report_.held_back;
 }
 
 bool Contact::advance_held(Positions& x) {
   if (arrived_) return false;
-  Positions to = x, obstacles = obstacle_end_;
+  Positions to = x;
   parallel_for(static_cast<std::size_t>(x.rows()), [&](std::size_t v) {
     const auto row = static_cast<Eigen::Index>(v);
     if ((*problem_->fixed)[v]) to.row(row) = problem_->predicted->row(row);
   });
-  model_.sewing.follow(end_time_, to);
-  const Positions from = obstacle_now_;
-  carry_along({x, from}, to, obstacles);
-  const Shortening way = shorten({x, from}, to, obstacles);
-  if (way.most == 0) return false;
-  note_held(way);
+  if (!go_on(x, to)) return false;
   std::swap(x, to);
-  std::swap(obstacle_now_, obstacles);
   return true;
+}
+
+/// Bodies with a closed form move at once, and cloth that lies on others cannot always give way so
+/// far: then they go a part of their way.
+bool Contact::go_on(const Positions& from, Positions& to) {
+  const Positions wanted = bodies_.move_in_step() ? to : Positions();
+  const Positions obstacles = obstacle_now_;
+  for (double part = 1;; part = part > kLeastPart ? part / 2 : 0) {
+    const Shortening way = go_on_by(part, from, obstacles, to);
+    const bool enters = way.any && part > 0 && bodies_.move_in_step() &&
+                        bodies_.any_enters(from, *problem_->fixed, to);
+    if (!enters) {
+      note_held(way);
+      return way.most > 0 || (part > 0 && bodies_.move_in_step());
+    }
+    bodies_.take_back();
+    to = wanted;
+  }
+}
+
+Shortening Contact::go_on_by(double part, const Positions& from, const Positions& obstacles,
+                             Positions& to) {
+  listed_ = -1;
+  model_.sewing.follow(end_time_, to);
+  if (held_moves(from, to)) carry_along({from, obstacles}, to, obstacle_end_);
+  bodies_.move(part, from, *problem_->fixed, to);
+  model_.sewing.follow(end_time_, to);
+  obstacle_now_ = obstacle_end_;
+  return shorten({from, obstacles}, to, obstacle_now_);
+}
+
+void Contact::note_held(const Shortening& way) {
+  const double gone = std::min(way.least, bodies_.move_in_step() ? bodies_.part() : 1.0);
+  arrived_ = gone == 1;
+  report_.held_back = 1 - gone;
 }
 
 bool Contact::limit(const Positions& from, Positions& to) {

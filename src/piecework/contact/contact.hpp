@@ -90,9 +90,15 @@ class Contact final : public model::ContactTerms {
   /// Takes vertices in x along with what is held, moves, and is near them; `obstacles` are at the
   /// end of the way.
   void carry_along(const Points& from, Positions& x, const Positions& obstacles);
+  /// Moves what is held on from `from` to where the step wants it, as far as the cloth lets it;
+  /// false if it lets nothing.
+  bool go_on(const Positions& from, Positions& to);
+  /// The same with bodies that go a given part of the way that is left. \param obstacles  now
+  Shortening go_on_by(double part, const Positions& from, const Positions& obstacles,
+                      Positions& to);
   void note_held(const Shortening& way);
-  /// Pins or obstacles move in this step.
-  [[nodiscard]] bool held_moves(const Positions& x) const;
+  /// Pins or obstacles move on the way.
+  [[nodiscard]] bool held_moves(const Positions& from, const Positions& to) const;
   void find_active(const Positions& x);
   void find_active_pairs(const PairList& list, const Points& points);
   /// Contact distance and friction of a pair.
