@@ -28,6 +28,14 @@ void print_feature(const char* name, bool on, const std::string& why) {
   fmt::print("  {:<14} {:<4} {}\n", name, on ? "on" : "-", why);
 }
 
+/// \pre the scene has friction
+std::string friction_words(const scene::Scene& scene) {
+  const std::string words = fmt::format("coefficient {:g}", *scene.friction);
+  return scene.kinetic_friction
+             ? fmt::format("{}, {:g} of what slides", words, *scene.kinetic_friction)
+             : words;
+}
+
 void print_features(const runner::World& world) {
   const scene::Scene& scene = world.scene;
   std::size_t held = 0;
@@ -63,8 +71,7 @@ void print_features(const runner::World& world) {
     print_feature("contact", true,
                   fmt::format("from {:.3g} mm on", 1e3 * runner::contact_distance(world)));
     print_feature("friction", scene.friction.has_value(),
-                  scene.friction ? fmt::format("coefficient {:g}", *scene.friction)
-                                 : "the scene names no `friction`");
+                  scene.friction ? friction_words(scene) : "the scene names no `friction`");
   }
   print_feature(
       "damping", scene.damping.has_value(),

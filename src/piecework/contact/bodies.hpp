@@ -25,7 +25,7 @@ class Bodies {
  public:
   /// \param colliders  must outlive this object
   Bodies(std::span<const colliders::AnalyticCollider> colliders, const Activation& activation,
-         std::optional<double> friction);
+         std::optional<colliders::Friction> friction);
 
   [[nodiscard]] bool empty() const { return colliders_.empty(); }
 
@@ -61,7 +61,7 @@ class Bodies {
 
   std::span<const colliders::AnalyticCollider> colliders_;
   Activation activation_;
-  std::optional<double> friction_;
+  std::optional<colliders::Friction> friction_;
   std::vector<Eigen::Isometry3d> begin_, end_, now_;
   std::vector<NearBody> near_;
   std::vector<std::vector<NearBody>> blocks_;

@@ -218,7 +218,8 @@ std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
                         .stiffness = scene.contact.stiffness
                                          ? *scene.contact.stiffness
                                          : contact::default_stiffness(world.model, scene.step.h)};
-  options.friction = scene.friction;
+  if (scene.friction)
+    options.friction = {*scene.friction, scene.kinetic_friction.value_or(*scene.friction)};
   options.slip_speed = scene.contact.slip_speed;
   options.ccd.method =
       scene.quality.ccd == "newton" ? collision::CcdMethod::Newton : collision::CcdMethod::Halley;
