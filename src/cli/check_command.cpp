@@ -67,7 +67,7 @@ void print_features(const runner::World& world) {
                     ? "the scene names no `colliders`"
                     : fmt::format("{} {}", scene.colliders.size(),
                                   scene.colliders.size() == 1 ? "body" : "bodies"));
-  if (scene.self_collision || !scene.colliders.empty()) {
+  if (runner::may_touch(world)) {
     print_feature("contact", true,
                   fmt::format("from {:.3g} mm on", 1e3 * runner::contact_distance(world)));
     print_feature("friction", scene.friction.has_value(),
@@ -121,6 +121,7 @@ int check(const std::string& path, const std::vector<std::string>& set) {
   for (const std::string& text : set) overrides.push_back(parse_override(text));
   const auto world = runner::build_world(scene::load_scene(path, overrides));
   const runner::ExpectationChecker expectations(*world);
+  runner::require_contact(*world);  // before anything is printed
   const auto& s = world->domain_summary;
   fmt::print("{}: sound\n", world->scene.name);
   print_cloths(*world);
