@@ -344,7 +344,7 @@ TEST_F(SceneFiles, ShippedScenesLoadByNameAndReadBack) {
     EXPECT_EQ(parse_scene(resolved_json(scene), scene.source), scene);
   }
   for (const char* name : {"cloth_on_stairs", "drape_on_sphere", "flag_in_wind", "folding",
-                           "garment_on_avatar", "hanging_tablecloth", "knot", "pot_drape",
+                           "funnel", "garment_on_avatar", "hanging_tablecloth", "knot", "pot_drape",
                            "sewn_bag", "sleeve_push", "stack_of_20", "trampoline", "two_sheets"})
     EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
 }
