@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Everything in ci/test.sh, then clang-tidy, the unit tests under TSan, and the benchmarks in their
-# quick form (they check what they compute; the times of a quick run mean nothing).
+# Everything in ci/test.sh, then clang-tidy, the unit tests under TSan, the dearer scenes, and the benchmarks
+# in their quick form (they check what they compute; the times of a quick run mean nothing).
 #
 #   bash ci/full.sh [--no-install] [--changed-since REF]   REF limits clang-tidy to changed files
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -33,10 +33,22 @@ benchmarks_quick() {
   done
 }
 
+# Scenes that take too long for ci/test.sh: they keep their expectations, and nothing interpenetrates.
+scenes_in_full() {
+  local name
+  for name in folding funnel knot pot_drape stack_of_20; do
+    with_progress "out/scenes/$name.log" build/release/bin/piecework run "$name" --no-images \
+      --no-state --expect --strict --overwrite -o "out/scenes/$name" ||
+      { tail -n 15 "out/scenes/$name.log" >&2; die "scene $name failed"; }
+    say "  $name"
+  done
+}
+
 ensure_packages "$install" build check full
 cd "$root"
 gate_suites
 run_suite tidy "$root/ci/tidy.sh" "${tidy[@]}"
 run_suite tsan tests_of tsan tsan.xml unit
+run_suite scenes scenes_in_full
 run_suite benchmarks benchmarks_quick
 close_suites

@@ -28,6 +28,14 @@ void print_feature(const char* name, bool on, const std::string& why) {
   fmt::print("  {:<14} {:<4} {}\n", name, on ? "on" : "-", why);
 }
 
+/// \pre the scene has friction
+std::string friction_words(const scene::Scene& scene) {
+  const std::string words = fmt::format("coefficient {:g}", *scene.friction);
+  return scene.kinetic_friction
+             ? fmt::format("{}, {:g} of what slides", words, *scene.kinetic_friction)
+             : words;
+}
+
 void print_features(const runner::World& world) {
   const scene::Scene& scene = world.scene;
   std::size_t held = 0;
@@ -59,12 +67,11 @@ void print_features(const runner::World& world) {
                     ? "the scene names no `colliders`"
                     : fmt::format("{} {}", scene.colliders.size(),
                                   scene.colliders.size() == 1 ? "body" : "bodies"));
-  if (scene.self_collision || !scene.colliders.empty()) {
+  if (runner::may_touch(world)) {
     print_feature("contact", true,
                   fmt::format("from {:.3g} mm on", 1e3 * runner::contact_distance(world)));
     print_feature("friction", scene.friction.has_value(),
-                  scene.friction ? fmt::format("coefficient {:g}", *scene.friction)
-                                 : "the scene names no `friction`");
+                  scene.friction ? friction_words(scene) : "the scene names no `friction`");
   }
   print_feature(
       "damping", scene.damping.has_value(),
@@ -114,6 +121,7 @@ int check(const std::string& path, const std::vector<std::string>& set) {
   for (const std::string& text : set) overrides.push_back(parse_override(text));
   const auto world = runner::build_world(scene::load_scene(path, overrides));
   const runner::ExpectationChecker expectations(*world);
+  runner::require_contact(*world);  // before anything is printed
   const auto& s = world->domain_summary;
   fmt::print("{}: sound\n", world->scene.name);
   print_cloths(*world);

@@ -187,6 +187,8 @@ TEST_F(RunPictures, ContactHasAColour) {
     strong_apart += apart.rgb[i] > apart.rgb[i + 2] + 60 ? 1U : 0U;
   }
   EXPECT_GT(strong, strong_apart + 3000);
+  const auto by_key = run(scene_with(near), "--set render.color=contact").first;
+  EXPECT_TRUE(by_key.rgb == touching.rgb) << "the scene may say so, too";
 }
 
 TEST_F(RunPictures, ContactIsRefusedWhereNothingCanTouch) {

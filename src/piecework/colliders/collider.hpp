@@ -13,11 +13,19 @@
 
 namespace piecework::colliders {
 
+/// Coefficients of dry friction.
+struct Friction {
+  double sticking = 0;        ///< up to which nothing slides, mu_s
+  double sliding = sticking;  ///< of what slides, mu_k <= mu_s
+
+  bool operator==(const Friction&) const = default;
+};
+
 /// What every collider has.
 struct Traits {
   std::string name;
-  std::optional<double> friction;   ///< coefficient; absent: that of the scene
-  std::optional<double> thickness;  ///< distance that cloth keeps, m; absent: that of the scene
+  std::optional<Friction> friction;  ///< absent: that of the scene
+  std::optional<double> thickness;   ///< distance that cloth keeps, m; absent: that of the scene
 };
 
 /// A solid with a closed form, placed and moved rigidly.

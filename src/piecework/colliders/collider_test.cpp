@@ -82,7 +82,7 @@ double volume(const Triangles& triangles, const Positions& x) {
 
 TEST(MeshCollider, StandsOrMovesRigidly) {
   const mesh::TriangleMesh box = mesh::box(Vec3(1, 2, 3));
-  const MeshCollider still({"box", 0.3, 0.001}, box, Eigen::Affine3d::Identity(), {});
+  const MeshCollider still({"box", Friction{0.3}, 0.001}, box, Eigen::Affine3d::Identity(), {});
   EXPECT_TRUE(still.is_static());
   EXPECT_TRUE(still.closed());
   Positions x;

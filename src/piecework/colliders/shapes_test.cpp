@@ -1,7 +1,9 @@
 #include <piecework/colliders/shapes.hpp>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <piecework/colliders/collider.hpp>
 #include <piecework/colliders/solid_test_util.hpp>
 #include <piecework/colliders/tessellation.hpp>
 #include <piecework/core/error.hpp>
@@ -63,6 +65,55 @@ TEST(Shapes, VerticesOfTheTessellationLieOnTheSurface) {
     for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
       EXPECT_NEAR(signed_distance(example.shape, mesh.positions.row(v)).distance, 0, 1e-12);
   }
+}
+
+TEST(Shapes, ClosedSurfacesAreClosedAndEncloseTheSolid) {
+  for (const Example& example : examples()) {
+    if (!example.bounded) continue;
+    for (const int quarter : {1, 2, 5, 16}) {
+      SCOPED_TRACE(fmt::format("{}, {} chords", example.name, quarter));
+      const mesh::TriangleMesh mesh = closed_surface(example.shape, quarter, "body");
+      const MeshCollider collider({"body", {}, {}}, mesh, Eigen::Affine3d::Identity(), {});
+      EXPECT_TRUE(collider.closed());
+      for (Eigen::Index v = 0; v < mesh.positions.rows(); ++v)
+        EXPECT_NEAR(signed_distance(example.shape, mesh.positions.row(v)).distance, 0, 1e-9);
+    }
+  }
+}
+
+TEST(Shapes, ClosedSurfacesOfFewChordsLieInsideOfTheSolid) {
+  for (const Example& example : examples()) {
+    if (!example.bounded) continue;
+    SCOPED_TRACE(example.name);
+    const mesh::TriangleMesh mesh = closed_surface(example.shape, 3, "body");
+    Random random(5);
+    int inside = 0;
+    for (int i = 0; i < 300; ++i) {
+      const Vec3 p = random_point(random, 1.2);
+      const double distance = signed_distance(example.shape, p).distance;
+      constexpr double kChords = 0.1;
+      if (distance < 0 && distance > -kChords) continue;
+      EXPECT_NEAR(winding_number(mesh, p), distance < 0 ? 1 : 0, 1e-6);
+      inside += distance < 0;
+    }
+    EXPECT_GT(inside, 2);
+  }
+}
+
+TEST(Shapes, HalfSpacesWithoutEndHaveNoClosedSurface) {
+  int refused = 0;
+  for (const Example& example : examples()) {
+    if (example.bounded || std::holds_alternative<Plane>(example.shape)) continue;
+    try {
+      (void)closed_surface(example.shape, 1, "the body");
+      ADD_FAILURE() << example.name;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("the body: its planes leave a side open"),
+                std::string::npos);
+      ++refused;
+    }
+  }
+  EXPECT_EQ(refused, 3);
 }
 
 // The oracle: brute force over triangles, and their winding number for the sign. Round shapes lie

@@ -1,5 +1,6 @@
 #include <piecework/contact/activation.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace piecework::contact {
@@ -49,10 +50,13 @@ ActivationValue Activation::operator()(double d) const {
   return {};
 }
 
-FrictionValue smoothed_friction(double y, double slip) {
-  if (y >= slip) return {y - slip / 3, 1 / y};
+FrictionValue smoothed_friction(double y, double slip, double sliding) {
   const double r = y / slip;
-  return {slip * r * r * (1 - r / 3), (2 - r) / slip};
+  if (y < slip) return {slip * r * r * (1 - r / 3), (2 - r) / slip};
+  // The force loses (1 - sliding) t^2 (3 - 2 t) until t = 1; the energy loses the integral of that.
+  const double t = std::min(r - 1, 1.0), past = std::max(y - 2 * slip, 0.0);
+  const double lost = slip * t * t * t * (1 - 0.5 * t) + past;
+  return {y - slip / 3 - (1 - sliding) * lost, (1 - (1 - sliding) * t * t * (3 - 2 * t)) / y};
 }
 
 }  // namespace piecework::contact

@@ -39,11 +39,13 @@ struct Activation {
 };
 
 /// Friction as a potential of the slip y >= 0, m, smoothed below `slip` [Li et al. 2020, Eq. 15]:
-/// f0' = f1 rises from 0 to 1 at y = slip. Multiplied by mu times the pressure.
+/// f0' = f1 rises from 0 to 1 at y = slip; then, since what slides holds less than what sticks
+/// [Ly et al. 2020], it falls to `sliding` at 2 slip. Multiplied by mu_s times the pressure.
 struct FrictionValue {
   double energy;       ///< f0(y), m
-  double force_ratio;  ///< f1(y) / y, 1/m; finite at y = 0
+  double force_ratio;  ///< f1(y) / y, 1/m; finite at y = 0, and never grows with y
 };
-FrictionValue smoothed_friction(double y, double slip);
+/// \param sliding  mu_k / mu_s, 0 to 1
+FrictionValue smoothed_friction(double y, double slip, double sliding);
 
 }  // namespace piecework::contact

@@ -63,26 +63,55 @@ TEST_P(EveryBarrier, IsABarrierOnlyIfItsEnergyGrowsWithoutBound) {
 
 INSTANTIATE_TEST_SUITE_P(All, EveryBarrier, ::testing::Values(None, TwoStage, Ipc, Exponential));
 
-TEST(SmoothedFriction, ForceIsTheSlopeOfTheEnergyAndSaturates) {
-  constexpr double kSlip = 1e-5;
-  for (const double part : {0.01, 0.5, 0.99, 1.01, 3.0, 1000.0}) {
+class EveryFriction : public ::testing::TestWithParam<double> {
+ protected:
+  static constexpr double kSlip = 1e-5;
+  [[nodiscard]] FrictionValue f(double y) const { return smoothed_friction(y, kSlip, GetParam()); }
+};
+
+TEST_P(EveryFriction, ForceIsTheSlopeOfTheEnergyAndSaturates) {
+  for (const double part : {0.01, 0.5, 0.99, 1.01, 1.3, 1.7, 1.99, 2.01, 3.0, 1000.0}) {
     const double y = part * kSlip, e = 1e-4 * std::min(y, kSlip);
-    const double slope =
-        (smoothed_friction(y + e, kSlip).energy - smoothed_friction(y - e, kSlip).energy) / (2 * e);
-    const double force = smoothed_friction(y, kSlip).force_ratio * y;
+    const double slope = (f(y + e).energy - f(y - e).energy) / (2 * e);
+    const double force = f(y).force_ratio * y;
     EXPECT_NEAR(force, slope, 1e-7) << part;
     EXPECT_LE(force, 1 + 1e-12);
-    if (part > 1) {
-      EXPECT_NEAR(force, 1, 1e-12);
+    if (part > 2) {
+      EXPECT_NEAR(force, GetParam(), 1e-12) << "of what slides";
     }
   }
-  const FrictionValue rest = smoothed_friction(0, kSlip);
-  EXPECT_EQ(rest.energy, 0);
-  EXPECT_NEAR(rest.force_ratio, 2 / kSlip, 1e-9 / kSlip) << "stiffness at rest";
-  const FrictionValue below = smoothed_friction(kSlip * (1 - 1e-12), kSlip);
-  const FrictionValue above = smoothed_friction(kSlip * (1 + 1e-12), kSlip);
-  EXPECT_NEAR(below.energy, above.energy, 1e-10 * kSlip);
-  EXPECT_NEAR(below.force_ratio, above.force_ratio, 1e-10 / kSlip);
+  EXPECT_EQ(f(0).energy, 0);
+  EXPECT_NEAR(f(0).force_ratio, 2 / kSlip, 1e-9 / kSlip) << "stiffness at rest";
+  EXPECT_NEAR(f(kSlip).force_ratio * kSlip, 1, 1e-12) << "all that sticking can hold";
+}
+
+TEST_P(EveryFriction, ContinuesAtItsSeams) {
+  for (const double seam : {kSlip, 2 * kSlip}) {
+    const FrictionValue below = f(seam * (1 - 1e-12)), above = f(seam * (1 + 1e-12));
+    EXPECT_NEAR(below.energy, above.energy, 1e-10 * kSlip);
+    EXPECT_NEAR(below.force_ratio, above.force_ratio, 1e-10 / kSlip);
+  }
+}
+
+TEST_P(EveryFriction, LiesBelowTheParabolaThatTheHessianTakesForIt) {
+  for (double at = 0.05; at < 4; at += 0.05)
+    for (double y = 0; y < 5; y += 0.05) {
+      const FrictionValue here = f(at * kSlip);
+      const double parabola =
+          here.energy + 0.5 * here.force_ratio * kSlip * kSlip * (y * y - at * at);
+      EXPECT_LE(f(y * kSlip).energy, parabola + 1e-12 * kSlip) << at << " " << y;
+      EXPECT_GE(here.force_ratio, 0);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryFriction, ::testing::Values(1.0, 0.6, 0.0));
+
+TEST(SmoothedFriction, OfOneCoefficientIsThatOfLiAndOthersToTheLastBit) {
+  constexpr double kSlip = 1e-5;
+  for (const double y : {1e-5, 1.2e-5, 1.9e-5, 2e-5, 2.3e-5, 0.7}) {
+    EXPECT_EQ(smoothed_friction(y, kSlip, 1).energy, y - kSlip / 3);
+    EXPECT_EQ(smoothed_friction(y, kSlip, 1).force_ratio, 1 / y);
+  }
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 Bodies::Bodies(std::span<const colliders::AnalyticCollider> colliders, const Activation& activation,
-               std::optional<double> friction)
+               std::optional<colliders::Friction> friction)
     : colliders_(colliders), activation_(activation), friction_(friction) {}
 
 double Bodies::distance(int body) const {
@@ -191,7 +191,7 @@ void Bodies::activate(const Positions& x, std::vector<ActivePair>& active) const
     pair.curvature = b.curvature;
     pair.gradient.fill(Vec3::Zero());
     pair.gradient[0] = b.slope * at_vertex.normal;
-    pair.friction = collider.traits().friction.value_or(friction_.value_or(0));
+    pair.friction = collider.traits().friction.value_or(friction_.value_or(colliders::Friction{}));
     active.push_back(pair);
   }
 }

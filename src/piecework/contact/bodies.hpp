@@ -25,7 +25,7 @@ class Bodies {
  public:
   /// \param colliders  must outlive this object
   Bodies(std::span<const colliders::AnalyticCollider> colliders, const Activation& activation,
-         std::optional<double> friction);
+         std::optional<colliders::Friction> friction);
 
   [[nodiscard]] bool empty() const { return colliders_.empty(); }
 
@@ -78,7 +78,7 @@ class Bodies {
 
   std::span<const colliders::AnalyticCollider> colliders_;
   Activation activation_;
-  std::optional<double> friction_;
+  std::optional<colliders::Friction> friction_;
   double begin_time_ = 0, end_time_ = 0;
   bool moves_ = false;
   double part_ = 0, part_before_ = 0;

@@ -110,13 +110,13 @@ Activation Contact::activation_of(const NearPair& pair) const {
   return activation;
 }
 
-double Contact::friction_of(const NearPair& pair) const {
+colliders::Friction Contact::friction_of(const NearPair& pair) const {
   for (const int v : pair.vertices)
     if (v >= model_.num_vertices()) {
       const auto& traits = obstacles_.of_vertex(v - model_.num_vertices()).traits();
-      return traits.friction.value_or(options_.friction.value_or(0));
+      return traits.friction.value_or(options_.friction.value_or(colliders::Friction{}));
     }
-  return options_.friction.value_or(0);
+  return options_.friction.value_or(colliders::Friction{});
 }
 
 void Contact::begin_step(const model::StepProblem& problem, double begin, double end,
@@ -308,7 +308,13 @@ bool Contact::renew_friction() {
   parallel_for(active_.size(), [&](std::size_t i) {
     const ActivePair& pair = active_[i];
     FrictionPair& out = sliding_[i];
-    out = {pair.vertices, pair.count, pair.beta, pair.normal, pair.friction * pair.pressure,
+    const auto [sticking, sliding] = pair.friction;
+    out = {pair.vertices,
+           pair.count,
+           pair.beta,
+           pair.normal,
+           sticking * pair.pressure,
+           sticking > 0 ? sliding / sticking : 1,
            Vec3::Zero()};
     if (pair.count == 1) {
       out.start = bodies_.unslid(pair, before(pair.vertices[0]));
@@ -331,7 +337,7 @@ double Contact::add_friction(const Positions& x, Positions& gradient) {
   parallel_for(sliding_.size(), [&](std::size_t i) {
     FrictionPair& pair = sliding_[i];
     const Vec3 way = slid(pair, points);
-    const FrictionValue f = smoothed_friction(way.norm(), slip);
+    const FrictionValue f = smoothed_friction(way.norm(), slip, pair.sliding);
     pair.force_ratio = f.force_ratio;
     pair.energy = pair.limit * f.energy;
     pair.force = pair.limit * f.force_ratio * way;

@@ -25,8 +25,8 @@ struct ContactOptions {
   double h = 1.0 / 120.0;  ///< s
   bool self = false;       ///< cloth touches cloth
   Activation activation;
-  std::optional<double> friction;  ///< mu; absent: none
-  double slip_speed = 1e-3;        ///< below this friction is not yet fully developed, m/s
+  std::optional<colliders::Friction> friction;  ///< absent: none
+  double slip_speed = 1e-3;  ///< below this friction is not yet fully developed, m/s
   collision::CcdOptions ccd;
   bool check = true;  ///< count interpenetrations after every step
 };
@@ -103,7 +103,7 @@ class Contact final : public model::ContactTerms {
   void find_active_pairs(const PairList& list, const Points& points);
   /// Contact distance and friction of a pair.
   [[nodiscard]] Activation activation_of(const NearPair& pair) const;
-  [[nodiscard]] double friction_of(const NearPair& pair) const;
+  [[nodiscard]] colliders::Friction friction_of(const NearPair& pair) const;
   /// How far a pair has slid since the step began, m.
   [[nodiscard]] Vec3 slid(const FrictionPair& pair, const Points& points) const;
   double add_friction(const Positions& x, Positions& gradient);

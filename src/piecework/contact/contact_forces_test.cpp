@@ -15,7 +15,7 @@ using collision::PairKind;
 struct Crumpled : ContactStep {
   Positions x;
 
-  explicit Crumpled(Barrier barrier, std::optional<double> friction = std::nullopt,
+  explicit Crumpled(Barrier barrier, std::optional<colliders::Friction> friction = std::nullopt,
                     double offset = 0.06)
       : ContactStep(stacked_sheets(2, 4, 0.1)) {
     options.activation = {barrier, 0.15, 40};
@@ -43,11 +43,19 @@ struct Crumpled : ContactStep {
   }
 };
 
+constexpr colliders::Friction kRubs{0.7};
+
 class EveryBarrierForce : public ::testing::TestWithParam<Barrier> {};
 
 TEST_P(EveryBarrierForce, IsTheGradientOfTheEnergy) { Crumpled(GetParam()).expect_gradient(); }
 
-TEST_P(EveryBarrierForce, WithFrictionToo) { Crumpled(GetParam(), 0.7).expect_gradient(); }
+TEST_P(EveryBarrierForce, WithFrictionToo) { Crumpled(GetParam(), kRubs).expect_gradient(); }
+
+TEST_P(EveryBarrierForce, WithLessFrictionOfWhatSlidesToo) {
+  const Crumpled step(GetParam(), colliders::Friction{0.7, 0.2}), as_much(GetParam(), kRubs);
+  step.expect_gradient();
+  EXPECT_LT(step.energy(step.x), as_much.energy(as_much.x)) << "something slides";
+}
 
 INSTANTIATE_TEST_SUITE_P(All, EveryBarrierForce,
                          ::testing::Values(Barrier::None, Barrier::TwoStage, Barrier::Ipc,
@@ -101,7 +109,7 @@ TEST(ContactForces, OfClothOnItselfHaveNoSumAndNoMoment) {
 }
 
 TEST(ContactForces, FrictionHasNoSumAndOpposesTheSlip) {
-  const Crumpled with(Barrier::TwoStage, 0.7), without(Barrier::TwoStage);
+  const Crumpled with(Barrier::TwoStage, kRubs), without(Barrier::TwoStage);
   ASSERT_TRUE(with.x == without.x);
   const Positions friction = with.gradient(with.x) - without.gradient(without.x);
   const double scale = friction.cwiseAbs().sum();
@@ -129,14 +137,14 @@ TEST(ContactForces, OfBodiesAndMeshesAreTheGradientToo) {
   step.previous.col(1).array() += 0.05;
   step.previous += testing::random_positions(25, 0.04, 5);
   const auto here = Eigen::Isometry3d::Identity();
-  step.bodies.emplace_back(colliders::Traits{"ball", 0.3, 0.2},
+  step.bodies.emplace_back(colliders::Traits{"ball", colliders::Friction{0.3}, 0.2},
                            colliders::Sphere{Vec3(0.6, -1, 0.5), 1}, here,
                            colliders::RigidMotion{});
   mesh::TriangleMesh floor = testing::grid_mesh(3, 3, 1.2);
-  step.meshes.emplace_back(colliders::Traits{"floor", 0.5, std::nullopt}, floor,
-                           Eigen::Affine3d::Identity(), colliders::RigidMotion{});
+  step.meshes.emplace_back(colliders::Traits{"floor", colliders::Friction{0.5}, std::nullopt},
+                           floor, Eigen::Affine3d::Identity(), colliders::RigidMotion{});
   step.options.activation = {Barrier::TwoStage, 0.12, 40};
-  step.options.friction = 0.4;
+  step.options.friction = colliders::Friction{0.4};
   step.options.slip_speed = 1;
   step.begin();
   (void)step.energy(step.previous);
@@ -146,7 +154,7 @@ TEST(ContactForces, OfBodiesAndMeshesAreTheGradientToo) {
   int of_body = 0, of_mesh = 0;
   for (const ActivePair& pair : step.contact->active()) {
     ++(pair.count == 1 ? of_body : of_mesh);
-    EXPECT_EQ(pair.friction, pair.count == 1 ? 0.3 : 0.5) << "the collider's own";
+    EXPECT_EQ(pair.friction.sticking, pair.count == 1 ? 0.3 : 0.5) << "the collider's own";
   }
   EXPECT_GT(of_body, 5);
   EXPECT_GT(of_mesh, 20);

@@ -184,7 +184,7 @@ TEST(Moves, FrictionStartsFromWhereBodiesAreWhenTheStepBegins) {
   // A floor that sinks fast: at the step's begin it carries the sheet, at its end it is far away.
   ContactStep step(testing::grid_mesh(4, 4));
   step.options.activation = {Barrier::TwoStage, 0.01, 50};
-  step.options.friction = 0.5;
+  step.options.friction = colliders::Friction{0.5};
   step.bodies.emplace_back(
       colliders::Traits{"floor", {}, {}}, colliders::Plane{Vec3(0, -0.005, 0), Vec3::UnitY()},
       Eigen::Isometry3d::Identity(), colliders::RigidMotion{.velocity = Vec3(0, -5, 0), .rate = 0});

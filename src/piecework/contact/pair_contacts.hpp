@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <piecework/colliders/collider.hpp>
 #include <piecework/contact/activation.hpp>
 #include <piecework/contact/near_pairs.hpp>
 
@@ -22,7 +23,7 @@ struct ActivePair {
   double pressure;               ///< -dE/dd, N
   double curvature;              ///< d2E/dd2, N/m
   std::array<Vec3, 4> gradient;  ///< of E, N
-  double friction = 0;           ///< coefficient mu
+  colliders::Friction friction;
 };
 
 /// \param rest  start shape: its lengths say what is parallel
@@ -36,8 +37,9 @@ struct FrictionPair {
   int count;
   std::array<double, 4> beta;
   Vec3 normal;
-  double limit;  ///< mu times the pressure, N
-  Vec3 start;    ///< where the first closest point was relative to the second, m
+  double limit;    ///< mu_s times the pressure, N
+  double sliding;  ///< mu_k / mu_s
+  Vec3 start;      ///< where the first closest point was relative to the second, m
   // Where the pair is now.
   double force_ratio = 0;     ///< f1(y) / y, 1/m
   double energy = 0;          ///< J

@@ -7,6 +7,7 @@
 
 #include <piecework/colliders/audit.hpp>
 #include <piecework/colliders/sequence.hpp>
+#include <piecework/colliders/tessellation.hpp>
 #include <piecework/collision/intersections.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/avatar.hpp>
@@ -26,8 +27,18 @@ colliders::RigidMotion motion_of(const scene::Collider& collider) {
           .stop = m.stop};
 }
 
-colliders::Traits traits_of(const scene::Collider& collider) {
-  return {.name = collider.name, .friction = collider.friction, .thickness = collider.thickness};
+/// Absent: that of the scene.
+std::optional<colliders::Friction> friction_of(const scene::Collider& collider,
+                                               const scene::Scene& scene) {
+  if (!collider.friction && !collider.kinetic_friction) return std::nullopt;
+  const double sticking = collider.friction ? *collider.friction : scene.friction.value_or(0);
+  return colliders::Friction{sticking, collider.kinetic_friction.value_or(sticking)};
+}
+
+colliders::Traits traits_of(const scene::Collider& collider, const scene::Scene& scene) {
+  return {.name = collider.name,
+          .friction = friction_of(collider, scene),
+          .thickness = collider.thickness};
 }
 
 /// Untouched directions keep their bits.
@@ -54,12 +65,13 @@ colliders::Shape shape_of(const scene::Collider& c) {
 }
 
 colliders::AnalyticCollider analytic_collider(const scene::Collider& collider,
-                                              const std::string& where) {
+                                              const scene::Scene& scene,
+                                              const std::string& pointer) {
   try {
-    return {traits_of(collider), shape_of(collider), placement_of<Eigen::Isometry3d>(collider),
-            motion_of(collider)};
+    return {traits_of(collider, scene), shape_of(collider),
+            placement_of<Eigen::Isometry3d>(collider), motion_of(collider)};
   } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", where, error.what()));
+    throw InputError(fmt::format("{}: {}: {}", scene.source, pointer, error.what()));
   }
 }
 
@@ -101,11 +113,22 @@ Body body_of(const scene::Avatar& a) {
   return body;
 }
 
-Body body_of(const scene::Collider& collider) {
+/// \param pointer  place of the collider in the scene, for messages
+/// \throws InputError if a file is missing or faulty, or if a shape is wrong or has no end
+Body body_of(const scene::Collider& collider, const scene::Scene& scene,
+             const std::string& pointer) {
   if (collider.sequence) return body_of(*collider.sequence);
-  if (collider.avatar) return body_of(*collider.avatar);
-  mesh::MeshDocument document = load_mesh(*collider.mesh);
-  return {std::move(document.mesh), {}, std::move(document.notes)};
+  if (collider.avatar) {
+    require_file(collider.avatar->file, scene.source, pointer + "/avatar/file");
+    return body_of(*collider.avatar);
+  }
+  if (collider.mesh) {
+    mesh::MeshDocument document = load_mesh(*collider.mesh);
+    return {std::move(document.mesh), {}, std::move(document.notes)};
+  }
+  const colliders::AnalyticCollider solid = analytic_collider(collider, scene, pointer);
+  const std::string name = fmt::format("{}: {}: {}", scene.source, pointer, collider.name);
+  return {colliders::closed_surface(solid.shape(), collider.segments, name), {}, {}};
 }
 
 }  // namespace
@@ -121,22 +144,19 @@ void add_colliders(World& world) {
   };
   for (std::size_t i = 0; i < world.scene.colliders.size(); ++i) {
     const scene::Collider& collider = world.scene.colliders[i];
-    if (collider.shape != "mesh") {
-      world.analytic_colliders.push_back(
-          analytic_collider(collider, fmt::format("{}: /colliders/{}", world.scene.source, i)));
+    const std::string pointer = fmt::format("/colliders/{}", i);
+    if (collider.shape != "mesh" && collider.surface == "exact") {
+      world.analytic_colliders.push_back(analytic_collider(collider, world.scene, pointer));
       note(world.analytic_colliders.back());
       continue;
     }
-    if (collider.avatar)
-      require_file(collider.avatar->file, world.scene.source,
-                   fmt::format("/colliders/{}/avatar/file", i));
-    Body body = body_of(collider);
+    Body body = body_of(collider, world.scene, pointer);
     for (const std::string& line : body.notes)
       world.notes.push_back(fmt::format("collider {}: {}", collider.name, line));
     auto placement = placement_of<Eigen::Affine3d>(collider);
     placement.scale(vec(collider.scale));
-    world.mesh_colliders.emplace_back(traits_of(collider), std::move(body.mesh), placement,
-                                      motion_of(collider), std::move(body.deformation));
+    world.mesh_colliders.emplace_back(traits_of(collider, world.scene), std::move(body.mesh),
+                                      placement, motion_of(collider), std::move(body.deformation));
     note(world.mesh_colliders.back());
   }
 }

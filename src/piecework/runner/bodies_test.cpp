@@ -67,7 +67,7 @@ TEST(Bodies, MeshesArePlacedAndMoved) {
   ASSERT_EQ(world->mesh_colliders.size(), 1U);
   const colliders::MeshCollider& pot = world->mesh_colliders[0];
   EXPECT_EQ(pot.traits().name, "pot");
-  EXPECT_EQ(pot.traits().friction, 0.4);
+  EXPECT_EQ(pot.traits().friction, colliders::Friction{0.4});
   EXPECT_EQ(pot.traits().thickness, 0.002);
   EXPECT_TRUE(pot.closed());
   EXPECT_FALSE(pot.is_static());
@@ -88,6 +88,45 @@ TEST(Bodies, EveryGeneratorOfBodiesIsClosed) {
     EXPECT_TRUE(world->mesh_colliders.at(0).closed()) << generator;
     EXPECT_FALSE(mentions(*world, "inside")) << generator;
   }
+}
+
+TEST(Bodies, TrianglesOfAShapeLieOnItAndMoveWithIt) {
+  const std::string shared = R"({"name": "post", "shape": "capsule", "from": [0, 0, 0],
+      "to": [0, 0, 1], "radius": 0.25, "rotate": [0, 30, 0], "translate": [0, 5, 0],
+      "friction": 0.4, "motion": {"velocity": [0, 1, 0], "rate": 2}, "surface": )";
+  const auto exact = build_world(with_colliders(shared + "\"exact\"}"));
+  const auto meshed = build_world(with_colliders(shared + "\"triangles\", \"segments\": 3}"));
+  ASSERT_EQ(exact->analytic_colliders.size(), 1U);
+  ASSERT_EQ(meshed->mesh_colliders.size(), 1U);
+  EXPECT_TRUE(meshed->analytic_colliders.empty());
+  const colliders::MeshCollider& post = meshed->mesh_colliders[0];
+  EXPECT_TRUE(post.closed());
+  EXPECT_EQ(post.traits().friction, colliders::Friction{0.4});
+  EXPECT_EQ(post.num_vertices(), 2 + 6 * 12) << "two poles, and rings of 4 x 3";
+  for (const double time : {0.0, 0.7}) {
+    Positions x;
+    post.positions_at(time, x);
+    for (Eigen::Index v = 0; v < x.rows(); ++v)
+      EXPECT_NEAR(exact->analytic_colliders[0].signed_distance(x.row(v), time).distance, 0, 1e-12);
+  }
+}
+
+TEST(Bodies, KineticFrictionIsTheColliders) {
+  const auto friction = [](const std::string& keys) {
+    return build_world(with_colliders(R"({"shape": "plane")" + keys + "}"))
+        ->analytic_colliders.at(0)
+        .traits()
+        .friction;
+  };
+  EXPECT_FALSE(friction("").has_value()) << "that of the scene";
+  EXPECT_EQ(friction(R"(, "friction": 0.5)"), (colliders::Friction{0.5, 0.5}));
+  EXPECT_EQ(friction(R"(, "friction": 0.5, "kinetic_friction": 0.2)"),
+            (colliders::Friction{0.5, 0.2}));
+  scene::Scene scene = with_colliders(R"({"shape": "plane"})");
+  scene.friction = 0.7;
+  scene.colliders[0].kinetic_friction = 0.1;
+  EXPECT_EQ(build_world(scene)->analytic_colliders.at(0).traits().friction,
+            (colliders::Friction{0.7, 0.1}));
 }
 
 TEST(Bodies, SequencesOfFiles) {
@@ -123,6 +162,14 @@ TEST(Bodies, RefusalsSayWhereAndWhatToDo) {
   EXPECT_NE(refused(R"({"shape": "half_spaces", "planes": [{"normal": [0, 1, 0]},
                         {"normal": [0, -1, 0], "point": [0, 1, 0]}]})")
                 .find("t.json: /colliders/0: half_spaces: no point lies below all 2 planes"),
+            std::string::npos);
+  EXPECT_NE(refused(R"({"name": "w", "shape": "half_spaces", "surface": "triangles",
+                        "planes": [{"normal": [0, 1, 0]}, {"normal": [1, 0, 0]}]})")
+                .find("t.json: /colliders/0: w: its planes leave a side open, which no triangles "
+                      "close; add planes, or leave out \"surface\""),
+            std::string::npos);
+  EXPECT_NE(refused(R"({"name": "b", "shape": "box", "rounding": 0.75, "surface": "triangles"})")
+                .find("t.json: /colliders/0: b: rounding is 0.75 m"),
             std::string::npos);
   EXPECT_NE(refused(R"({"name": "b", "shape": "box", "rounding": 0.75})")
                 .find("t.json: /colliders/0: b: rounding is 0.75 m"),

@@ -66,9 +66,10 @@ INSTANTIATE_TEST_SUITE_P(All, ContactScene,
                          ::testing::Values(Beginning{"cloth_on_stairs", 1, 16, 20, 20},
                                            Beginning{"drape_on_sphere", 1, 16, 16, 30},
                                            Beginning{"folding", 4, 16, 7, 20},
+                                           Beginning{"funnel", 1, 24, 6, 20},
                                            Beginning{"knot", 2, 61, 4, 60},
                                            Beginning{"pot_drape", 1, 16, 16, 20},
-                                           Beginning{"sleeve_push", 1, 16, 16, 30},
+                                           Beginning{"sleeve_push", 1, 16, 16, 20},
                                            Beginning{"stack_of_20", 20, 4, 4, 20}),
                          [](const auto& beginning) { return std::string(beginning.param.scene); });
 

@@ -24,7 +24,7 @@ struct Trial {
   Vec3 gravity{0, -kGravity, 0};
   std::vector<colliders::AnalyticCollider> bodies;
   bool self = false;
-  std::optional<double> friction;
+  std::optional<colliders::Friction> friction;
   double stiffness = 0;  ///< 0: from the cloth
   contact::Barrier barrier = contact::Barrier::TwoStage;
   model::StopOptions stop{StopRule::Gradient, 1e-4, 500, 1};
@@ -80,7 +80,7 @@ struct Engine {
 };
 
 /// A sheet just above the half-space y < 0, gravity turned by `angle` about z.
-Trial on_plane(double angle, std::optional<double> friction) {
+Trial on_plane(double angle, std::optional<colliders::Friction> friction) {
   Trial trial;
   trial.cloth.positions.col(1).array() += 0.7 * Engine::kDistance;
   trial.gravity = kGravity * Vec3(std::sin(angle), -std::cos(angle), 0);
@@ -102,7 +102,7 @@ TEST(ContactSteps, SheetAtRestIsCarriedByAsMuchAsItWeighs) {
 }
 
 TEST(ContactSteps, SheetSticksToAGentleSlope) {
-  Engine engine(on_plane(20 * std::numbers::pi / 180, 0.5));
+  Engine engine(on_plane(20 * std::numbers::pi / 180, colliders::Friction{0.5}));
   engine.run(40);
   const Vec3 before = engine.center();
   engine.run(20);
@@ -112,7 +112,7 @@ TEST(ContactSteps, SheetSticksToAGentleSlope) {
 
 TEST(ContactSteps, SheetSlidesDownASteepSlopeAsCoulombSays) {
   const double angle = 40 * std::numbers::pi / 180;
-  Engine engine(on_plane(angle, 0.5));
+  Engine engine(on_plane(angle, colliders::Friction{0.5}));
   engine.run(20);
   const double before = engine.velocity().x();
   engine.run(20);
@@ -121,8 +121,50 @@ TEST(ContactSteps, SheetSlidesDownASteepSlopeAsCoulombSays) {
   EXPECT_NEAR(acceleration, expected, 0.05 * expected);
 }
 
+TEST(ContactSteps, SheetThatSticksHoldsWhereOneThatSlidesGoesOn) {
+  const colliders::Friction friction{0.6, 0.3};
+  Engine level(on_plane(0, friction));
+  level.run(60);
+  const double angle = 25 * std::numbers::pi / 180;  // tan = 0.466
+  Engine engine(on_plane(angle, friction));
+  engine.state = level.state;  // a floor that is tilted: what falls on a slope has a speed already
+  engine.run(10);
+  const Vec3 before = engine.center();
+  engine.run(30);
+  EXPECT_LT((engine.center() - before).norm() / (30 * kH), 1e-3) << "no faster than slip_speed";
+  engine.state.v.col(0).array() += 0.2;
+  engine.state.previous_v = engine.state.v;
+  engine.run(20);
+  const double speed = engine.velocity().x();
+  engine.run(20);
+  const double expected = kGravity * (std::sin(angle) - 0.3 * std::cos(angle));
+  EXPECT_NEAR((engine.velocity().x() - speed) / (20 * kH), expected, 0.03 * expected);
+}
+
+TEST(ContactSteps, SheetSlidesDownASlopeAsFarAsKineticFrictionLetsIt) {
+  const double angle = 40 * std::numbers::pi / 180;  // tan = 0.839
+  Engine engine(on_plane(angle, colliders::Friction{0.7, 0.3}));
+  engine.run(20);
+  const double speed = engine.velocity().x(), begin = engine.center().x();
+  engine.run(20);
+  const double time = 20 * kH;
+  const double acceleration = kGravity * (std::sin(angle) - 0.3 * std::cos(angle));
+  // Implicit Euler is ahead by a h t / 2.
+  const double expected = speed * time + 0.5 * acceleration * time * (time + kH);
+  EXPECT_NEAR(engine.center().x() - begin, expected, 0.02 * expected);
+}
+
+TEST(ContactSteps, KineticFrictionAsLargeAsStaticChangesNoBit) {
+  Engine one(on_plane(0.7, colliders::Friction{0.5})),
+      two(on_plane(0.7, colliders::Friction{0.5, 0.5}));
+  one.run(20);
+  two.run(20);
+  EXPECT_GT(one.velocity().norm(), 0.1) << "it slides";
+  EXPECT_TRUE(one.state.x == two.state.x);
+}
+
 TEST(ContactSteps, ThrownSheetStopsAfterTheDistanceThatFrictionAllows) {
-  Engine engine(on_plane(0, 0.4));
+  Engine engine(on_plane(0, colliders::Friction{0.4}));
   engine.run(20);
   const double begin = engine.center().x();
   engine.state.v.col(0).array() += 1;
@@ -135,7 +177,7 @@ TEST(ContactSteps, ThrownSheetStopsAfterTheDistanceThatFrictionAllows) {
 }
 
 TEST(ContactSteps, MovingBodyTakesClothAlong) {
-  Trial trial = on_plane(0, 0.5);
+  Trial trial = on_plane(0, colliders::Friction{0.5});
   trial.bodies = {body(colliders::Plane{}, {.velocity = Vec3(0.3, 0.2, 0), .rate = 0})};
   Engine engine(std::move(trial));
   engine.run(40);
@@ -151,7 +193,7 @@ TEST(ContactSteps, CollidingSheetsKeepTheirMomentum) {
   trial.cloth = testing::disjoint_union(trial.cloth, above);
   trial.gravity.setZero();
   trial.self = true;
-  trial.friction = 0.3;
+  trial.friction = colliders::Friction{0.3};
   Engine engine(std::move(trial));
   engine.state.v.bottomRows(25).rowwise() += Eigen::RowVector3d(0.2, -1, 0);
   const Vec3 before = engine.momentum();
@@ -169,7 +211,7 @@ Trial drape() {
   trial.cloth.positions.rowwise() -= Eigen::RowVector3d(0.15, -0.103, 0.15);
   trial.bodies.push_back(body(colliders::Sphere{Vec3::Zero(), 0.1}));
   trial.self = true;
-  trial.friction = 0.3;
+  trial.friction = colliders::Friction{0.3};
   trial.stop = {StopRule::Gradient, 1e-2, 200, 1};
   return trial;
 }
@@ -254,7 +296,7 @@ class Extremes : public ::testing::TestWithParam<Extreme> {};
 
 TEST_P(Extremes, StayFiniteAndOutside) {
   const Extreme& extreme = GetParam();
-  Trial trial = on_plane(0, extreme.friction);
+  Trial trial = on_plane(0, colliders::Friction{extreme.friction});
   trial.material.density = extreme.density;
   trial.stiffness = extreme.stiffness;
   trial.barrier = extreme.barrier;

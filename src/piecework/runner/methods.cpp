@@ -205,11 +205,21 @@ double contact_distance(const World& world) {
       world.scene.source, distance, mean_edge));
 }
 
+bool may_touch(const World& world) {
+  return world.scene.self_collision || !world.analytic_colliders.empty() ||
+         !world.mesh_colliders.empty();
+}
+
+void require_contact(const World& world) {
+  if (!may_touch(world)) return;
+  require_contact_solver(world.scene);
+  (void)contact_distance(world);
+}
+
 std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
+  if (!may_touch(world)) return nullptr;
+  require_contact(world);
   const scene::Scene& scene = world.scene;
-  if (!scene.self_collision && world.analytic_colliders.empty() && world.mesh_colliders.empty())
-    return nullptr;
-  require_contact_solver(scene);
   contact::ContactOptions options;
   options.h = scene.step.h;
   options.self = scene.self_collision;
@@ -218,7 +228,8 @@ std::unique_ptr<model::ContactTerms> make_contact(const World& world) {
                         .stiffness = scene.contact.stiffness
                                          ? *scene.contact.stiffness
                                          : contact::default_stiffness(world.model, scene.step.h)};
-  options.friction = scene.friction;
+  if (scene.friction)
+    options.friction = {*scene.friction, scene.kinetic_friction.value_or(*scene.friction)};
   options.slip_speed = scene.contact.slip_speed;
   options.ccd.method =
       scene.quality.ccd == "newton" ? collision::CcdMethod::Newton : collision::CcdMethod::Halley;

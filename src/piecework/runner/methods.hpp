@@ -20,6 +20,12 @@ std::unique_ptr<model::Minimizer> make_minimizer(const World& world);
 /// \throws InputError if the mesh is too fine for it: neighbours would touch.
 double contact_distance(const World& world);
 
+/// The scene lets anything touch.
+bool may_touch(const World& world);
+
+/// \throws InputError if something may touch, but not with this method or this distance.
+void require_contact(const World& world);
+
 /// What the scene lets touch, or null. \pre `world` outlives it.
 std::unique_ptr<model::ContactTerms> make_contact(const World& world);
 

@@ -82,6 +82,8 @@ struct Collider {
   std::array<double, 3> size{1, 1, 1};               ///< box, m
   double rounding = 0;                               ///< box, cylinder, half_spaces, m
   std::vector<HalfSpace> planes;                     ///< half_spaces
+  std::string surface = "exact";                     ///< or "triangles"; all but plane and mesh
+  int segments = 16;                                 ///< with surface "triangles"
   std::optional<Mesh> mesh;                          ///< one of the three for "mesh"
   std::optional<Sequence> sequence;
   std::optional<Avatar> avatar;
@@ -89,8 +91,9 @@ struct Collider {
   std::array<double, 3> rotate{0, 0, 0};     ///< degrees about x, then y, then z
   std::array<double, 3> scale{1, 1, 1};      ///< "mesh"
   std::optional<Motion> motion;
-  std::optional<double> friction;
-  std::optional<double> thickness;  ///< m
+  std::optional<double> friction;          ///< absent: that of the scene
+  std::optional<double> kinetic_friction;  ///< absent: `friction`
+  std::optional<double> thickness;         ///< m
 
   bool operator==(const Collider&) const = default;
 };

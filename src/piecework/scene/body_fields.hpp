@@ -212,6 +212,21 @@ void fields(V& v, Collider& c) {
   v.list(Key{"planes", "planes below which the solid lies, 1 to 64"}.only(is({"half_spaces"}),
                                                                           "shape half_spaces"),
          c.planes);
+  v.choice(
+      Key{"surface", "what cloth meets"}.only(
+          !is({"plane", "mesh"}),
+          "a shape with a closed form and an end: sphere, capsule, box, cylinder, half_spaces"),
+      c.surface,
+      {{"exact",
+        "the solid itself; only vertices of the cloth meet it, so coarse cloth can be cut by "
+        "its edges, and it never waits for cloth"},
+       {"triangles",
+        "a closed mesh of it: edges meet edges, and a body that moves waits for cloth that "
+        "cannot give way; dearer"}});
+  v.value(
+      Key{"segments", "chords of each quarter of a circle; rounded boxes have half as many"}.only(
+          c.surface == "triangles", "surface triangles"),
+      c.segments, between(1, 256));
   v.object(Key{"mesh", "triangles that keep their shape"}.only(is({"mesh"}), "shape mesh"), c.mesh);
   v.object(Key{"sequence", "triangles from a file per frame"}.only(is({"mesh"}), "shape mesh"),
            c.sequence);
@@ -225,6 +240,11 @@ void fields(V& v, Collider& c) {
   v.object({"motion", "rigid motion; absent: none"}, c.motion);
   v.value({"friction", "coefficient of friction; absent: that of the scene"}, c.friction,
           between(0, 10));
+  v.value(
+      {"kinetic_friction",
+       "coefficient of friction of what slides, at most `friction`; absent: `friction`, or that "
+       "of the scene if that is absent too"},
+      c.kinetic_friction, between(0, 10));
   v.value({"thickness", "distance that cloth keeps from it; absent: that of the scene", "m"},
           c.thickness, above(0, 10));
 }

@@ -201,7 +201,8 @@ struct Scene {
   std::optional<Wind> wind;
   std::optional<double> damping;  ///< velocity damping rate, 1/s; absent: off
   bool self_collision = false;
-  std::optional<double> friction;  ///< coefficient; absent: none
+  std::optional<double> friction;          ///< coefficient; absent: none
+  std::optional<double> kinetic_friction;  ///< coefficient; absent: `friction`
   Contact contact;
   Solver solver;
   Quality quality;

@@ -158,12 +158,14 @@ TEST(SceneErrors, Keys) {
           {with(R"(@"humidity": 0.4)"),
            "/humidity: unknown key \"humidity\"; known keys here: name, description, step, "
            "gravity, "
-           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, "
+           "wind, damping, self_collision, friction, kinetic_friction, contact, solver, quality, "
+           "materials, cloths, "
            "seams, colliders, "
            "camera, render, expect"},
           {with(R"(@"a/b~c": 0.4)"),
            "/a~1b~0c: unknown key \"a/b~c\"; known keys here: name, description, step, gravity, "
-           "wind, damping, self_collision, friction, contact, solver, quality, materials, cloths, "
+           "wind, damping, self_collision, friction, kinetic_friction, contact, solver, quality, "
+           "materials, cloths, "
            "seams, colliders, "
            "camera, render, expect"},
           {R"(@{ "cloths": [] })",
@@ -242,6 +244,25 @@ TEST(SceneErrors, Colliders) {
           {in(R"({ "shape": "sphere", "friction": @-1 })"),
            "/colliders/0/friction: -1 is out of range; choose a value of at least 0 and at most "
            "10"},
+          {in(R"({ "shape": "sphere", "friction": 0.2, "kinetic_friction": @0.3 })"),
+           "/colliders/0/kinetic_friction: friction (0.2) is below kinetic_friction (0.3); "
+           "exchange "
+           "or correct them"},
+          {in(R"({ "shape": "sphere", "kinetic_friction": @0.3 })"),
+           "/colliders/0/kinetic_friction: \"kinetic_friction\" without \"friction\"; add "
+           "\"friction\", at least as large"},
+          {in(R"({ "shape": "plane", "surface": @"triangles" })"),
+           "/colliders/0/surface: \"surface\" has no effect here, it belongs to a shape with a "
+           "closed "
+           "form and an end: sphere, capsule, box, cylinder, half_spaces; remove it"},
+          {in(R"({ "shape": "sphere", "segments": @4 })"),
+           "/colliders/0/segments: \"segments\" has no effect here, it belongs to surface "
+           "triangles; "
+           "remove it"},
+          {in(R"({ "shape": "half_spaces", "planes": [ {} ], "surface": "triangles",
+                   "rounding": @0.1 })"),
+           "/colliders/0/rounding: triangles of half-spaces have sharp edges; leave out "
+           "\"rounding\", or \"surface\""},
           {in(R"({ "shape": "sphere" }, @{ "shape": "plane" })"),
            "/colliders/1/name: a second collider named \"collider\"; give each collider its own "
            "\"name\""}})

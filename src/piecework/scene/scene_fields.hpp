@@ -400,6 +400,7 @@ void fields(V& v, Render& r) {
            {{"domain", "one colour per domain"},
             {"dof", "domains pale, shared vertices as dots: duplicates and corners"},
             {"strain", "largest principal strain, with a colour bar"},
+            {"contact", "pressure of contact, with a colour bar; only where things can touch"},
             {"shaded", "one colour, lit"}});
   v.value({"size", "width and height", "pixels"}, r.size, between(16, 8192));
   v.value({"borders", "dark lines between domains"}, r.borders);
@@ -497,6 +498,9 @@ void fields(V& v, Scene& s) {
   v.value({"self_collision", "cloth touches cloth, its own included"}, s.self_collision);
   v.value({"friction", "coefficient of dry friction between what touches; absent: none"},
           s.friction, above(0, 100));
+  v.value({"kinetic_friction",
+           "coefficient of friction of what slides, at most `friction`; absent: `friction`"},
+          s.kinetic_friction, between(0, 100));
   v.object({"contact", "how things touch"}, s.contact);
   v.object({"solver", "how a step is solved"}, s.solver);
   v.object({"quality", "how accurately a step is solved"}, s.quality);

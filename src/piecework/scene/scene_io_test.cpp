@@ -38,7 +38,7 @@ constexpr const char* kEveryKey = R"({
                "newton": "never", "friction_renewals": 3, "pcg_tol": 0.5, "pcg_max": 9,
                "sd_iterations": 5,
                "preset": "reference" },
-  "self_collision": true, "friction": 0.5,
+  "self_collision": true, "friction": 0.5, "kinetic_friction": 0.25,
   "contact": { "distance": 0.002, "stiffness": 100, "barrier": "ipc", "slip_speed": 0.01,
                "check": false },
   "materials": { "m/1": { "density": 0.1, "stretching": 3e5, "thickness": 1e-3, "bending": 2e-6 },
@@ -66,8 +66,9 @@ constexpr const char* kEveryKey = R"({
   "colliders": [
     { "name": "floor", "shape": "plane", "point": [0, 1, 0], "normal": [1, 1, 0] },
     { "name": "post", "shape": "cylinder", "from": [1, 0, 0], "to": [1, 2, 0], "radius": 0.25,
-      "rounding": 0.125, "friction": 0.5, "thickness": 0.002 },
+      "rounding": 0.125, "friction": 0.5, "kinetic_friction": 0.125, "thickness": 0.002 },
     { "name": "crate", "shape": "box", "center": [1, 2, 3], "size": [3, 2, 1],
+      "surface": "triangles", "segments": 9,
       "motion": { "velocity": [1, 0, 0], "axis": [0, 0, 1], "center": [0, 5, 0], "rate": 2,
                   "start": 1, "stop": 3 } },
     { "name": "wedge", "shape": "half_spaces",
@@ -137,8 +138,10 @@ std::vector<Collider> expected_colliders() {
   std::vector<Collider> c(7);
   c[0].name = "floor", c[0].shape = "plane", c[0].point = {0, 1, 0}, c[0].normal = {1, 1, 0};
   c[1].name = "post", c[1].shape = "cylinder", c[1].from = {1, 0, 0}, c[1].to = {1, 2, 0};
-  c[1].radius = 0.25, c[1].rounding = 0.125, c[1].friction = 0.5, c[1].thickness = 0.002;
+  c[1].radius = 0.25, c[1].rounding = 0.125, c[1].friction = 0.5, c[1].kinetic_friction = 0.125,
+  c[1].thickness = 0.002;
   c[2].name = "crate", c[2].shape = "box", c[2].center = {1, 2, 3}, c[2].size = {3, 2, 1};
+  c[2].surface = "triangles", c[2].segments = 9;
   c[2].motion = Motion{{1, 0, 0}, {0, 0, 1}, {0, 5, 0}, 2, 1, 3};
   c[3].name = "wedge", c[3].shape = "half_spaces";
   c[3].planes = {{{1, 0, 0}, {1, 1, 0}}, {{0, 0, 0}, {0, 0, 1}}};
@@ -164,7 +167,7 @@ Scene expected_every_key() {
                   "unprojected", "pcg",         0.75};
   scene.quality = {"dx_rms", 1e-3,    11, 2,   "anderson", 7, "single",
                    "newton", "never", 3,  0.5, 9,          5, "reference"};
-  scene.self_collision = true, scene.friction = 0.5;
+  scene.self_collision = true, scene.friction = 0.5, scene.kinetic_friction = 0.25;
   scene.contact = {0.002, 100, "ipc", 0.01, false};
   scene.materials = {{"m/1", {0.1, 3e5, 1e-3, 2e-6}}, {"soft", {0.2, 2e4, 1, std::nullopt}}};
   scene.seams = expected_seams();
@@ -341,7 +344,7 @@ TEST_F(SceneFiles, ShippedScenesLoadByNameAndReadBack) {
     EXPECT_EQ(parse_scene(resolved_json(scene), scene.source), scene);
   }
   for (const char* name : {"cloth_on_stairs", "drape_on_sphere", "flag_in_wind", "folding",
-                           "garment_on_avatar", "hanging_tablecloth", "knot", "pot_drape",
+                           "funnel", "garment_on_avatar", "hanging_tablecloth", "knot", "pot_drape",
                            "sewn_bag", "sleeve_push", "stack_of_20", "trampoline", "two_sheets"})
     EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
 }

@@ -132,6 +132,14 @@ void check_normal(const std::array<double, 3>& normal, const Part& part) {
                             "write one, such as [0, 1, 0]");
 }
 
+void check_friction(std::optional<double> friction, std::optional<double> kinetic,
+                    const Part& part) {
+  part.in("kinetic_friction")
+      .require(friction.has_value() || !kinetic, "\"kinetic_friction\" without \"friction\"",
+               "add \"friction\", at least as large");
+  check_order(part.in("kinetic_friction"), kinetic, friction, "kinetic_friction", "friction");
+}
+
 void check_collider(const Collider& collider, const Part& part) {
   const int sources = int{collider.mesh.has_value()} + int{collider.sequence.has_value()} +
                       int{collider.avatar.has_value()};
@@ -141,6 +149,10 @@ void check_collider(const Collider& collider, const Part& part) {
   check_normal(collider.normal, part);
   part.require(collider.shape != "half_spaces" || !collider.planes.empty(),
                "\"half_spaces\" without \"planes\"", "list at least one");
+  part.in("rounding")
+      .require(
+          collider.shape != "half_spaces" || collider.surface == "exact" || collider.rounding == 0,
+          "triangles of half-spaces have sharp edges", "leave out \"rounding\", or \"surface\"");
   for (std::size_t i = 0; i < collider.planes.size(); ++i)
     check_normal(collider.planes[i].normal, part.in("planes").in(i));
   part.in("to").require(collider.shape != "cylinder" || collider.from != collider.to,
@@ -159,6 +171,9 @@ void check_colliders(const Scene& scene, const Part& part) {
                                   fmt::format("a second collider named \"{}\"", printable(name)),
                                   "give each collider its own \"name\"");
     check_collider(scene.colliders[i], part.in(i));
+    const Collider& collider = scene.colliders[i];
+    check_friction(collider.friction ? collider.friction : scene.friction,
+                   collider.kinetic_friction, part.in(i));
   }
 }
 
@@ -239,6 +254,7 @@ void check_rules(const Scene& scene, const Document& document) {
       "the camera looks at its own position", "move \"target\" or \"position\"");
   for (std::size_t i = 0; i < scene.seams.size(); ++i)
     check_seam(scene.seams[i], scene, root.in("seams").in(i));
+  check_friction(scene.friction, scene.kinetic_friction, root);
   check_colliders(scene, root.in("colliders"));
   for (std::size_t i = 0; i < scene.expect.size(); ++i)
     check_expectation(scene.expect[i], scene, root.in("expect").in(i));
