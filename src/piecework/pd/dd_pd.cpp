@@ -18,9 +18,6 @@ constexpr double kArmijo = 1e-4;
 /// Energies closer than this, relative, are equal: their sum has rounded.
 constexpr double kEnergyRounding = 1e-13;
 constexpr int kMaxBacktracks = 30;
-/// If more than this of the slope is left at the end of Newton's way, it is followed farther, by
-/// factors of these.
-constexpr double kSteep = 0.6, kLeastGrowth = 2, kGrowth = 4;
 /// Iterations that lower neither the energy by more than rounding nor the gradient by a tenth: no
 /// more is to be had.
 constexpr int kPatience = 15;
@@ -254,33 +251,9 @@ void DdPd::accept(const Positions& moved, double scale, double step, model::Step
   convergence_.assume_newton(newton_proposed_);
   convergence_.assume_stiffness_ratio(metric_.normals_in_use() ? 1.0 : stiffness_ratio_);
   // What contact or a barrier cut off is still to be done.
-  const double wanted = sweeps_ ? scale : newton_proposed_ ? std::max(step, 1.0) : step;
+  const double wanted = sweeps_ ? scale : newton_proposed_ ? 1.0 : step;
   convergence_.measure_increment(sweeps_ ? moved : d_, wanted, report);
   std::swap(now_, trial_);
-}
-
-/// Where compressed cloth is about to buckle, the projected second derivative is much stiffer than
-/// the true one: the slope at the end of Newton's way is nearly that at its beginning, and one way
-/// after another leads on in the same direction. Then it is followed farther at once. Returns the
-/// step to trial_.
-double DdPd::lengthen(const model::StepProblem& problem, double slope, model::StepReport& report) {
-  double step = 1;
-  for (;;) {
-    const double ratio = dot(trial_.g, d_) / slope;
-    if (!(ratio > kSteep)) return step;
-    std::swap(trial_, shorter_);
-    const double longer =
-        step * (ratio < 1 ? std::clamp(1 / (1 - ratio), kLeastGrowth, kGrowth) : kGrowth);
-    metric_.reduction().advance(now_.x, longer, d_, trial_.x);
-    const bool cut = contact_ && contact_->limit(now_.x, trial_.x);
-    if (!cut) evaluate(trial_, problem, report);
-    if (cut || !(trial_.energy < shorter_.energy)) {
-      std::swap(trial_, shorter_);
-      if (contact_) evaluate(trial_, problem, report);  // contact speaks of its last evaluation
-      return step;
-    }
-    step = longer;
-  }
 }
 
 bool DdPd::line_search(const model::StepProblem& problem, double slope, model::StepReport& report) {
@@ -295,7 +268,6 @@ bool DdPd::line_search(const model::StepProblem& problem, double slope, model::S
     const Positions& moved = other_way ? moved_ : d_;
     const double scale = other_way ? 1.0 : step;
     if (is_acceptable(cut ? dot(now_.g, moved_) : step * slope, moved, scale)) {
-      if (newton_proposed_ && !cut && step == 1) step = lengthen(problem, slope, report);
       accept(moved, scale, step, report);
       return true;
     }

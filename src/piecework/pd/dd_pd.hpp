@@ -84,7 +84,6 @@ class DdPd final : public model::Minimizer {
   [[nodiscard]] bool is_acceptable(double slope, const Positions& moved, double scale);
   /// now_ <- trial_; the way there was scale times `moved`, the way wanted step d_.
   void accept(const Positions& moved, double scale, double step, model::StepReport& report);
-  double lengthen(const model::StepProblem& problem, double slope, model::StepReport& report);
   bool line_search(const model::StepProblem& problem, double slope, model::StepReport& report);
   void consider_normals(const std::vector<double>* memory, model::StepReport& report);
   void refresh_normals(model::StepReport& report);
