@@ -10,6 +10,7 @@
 #include <piecework/colliders/audit.hpp>
 
 #include "groups.hpp"
+#include "regions.hpp"
 
 namespace piecework::untangle {
 namespace {
@@ -77,33 +78,6 @@ Push apart(const Crossing& c, const Vec3& way) {
           way.norm()};
 }
 
-/// Which vertices hang together when the edges that pass through something are cut, and how many.
-class Regions {
- public:
-  Regions(const Setting& setting, const std::vector<collision::Intersection>& crossings)
-      : groups_(setting.model.num_vertices()), size_(at(setting.model.num_vertices()), 0) {
-    std::vector<char> cut(setting.surface.edges.size(), 0);
-    for (const collision::Intersection& c : crossings) cut[at(c.edge)] = 1;
-    for (std::size_t e = 0; e < cut.size(); ++e) {
-      const auto& [v, w] = setting.surface.edges[e];
-      if (!cut[e] && setting.surface.is_cloth(v)) groups_.join(v, w);
-    }
-    for (int v = 0; v < setting.model.num_vertices(); ++v) ++size_[at(groups_.find(v))];
-  }
-
-  /// The end of the edge that is in the smaller region, which has come through; nothing if both are
-  /// in one.
-  std::optional<std::size_t> smaller(const EdgeVertices& edge) {
-    const int a = groups_.find(edge[0]), b = groups_.find(edge[1]);
-    if (a == b) return std::nullopt;
-    return std::pair(size_[at(a)], -a) < std::pair(size_[at(b)], -b) ? 0 : 1;
-  }
-
- private:
-  Groups groups_;
-  std::vector<int> size_;
-};
-
 /// The direction of the contour from the crossing into a face beside its edge; zero if there is
 /// none.
 Vec3 contour_direction(const Crossing& c, const Triangle& face, const Positions& x) {
@@ -148,6 +122,22 @@ Vec3 lifting_direction(const Setting& setting, const Crossing& c, const Position
   return along_own ? own : Vec3(-c.normal);
 }
 
+/// Which crossings lie on one contour of intersection: those on the same two triangles. Per crossing
+/// the first one of its contour.
+std::vector<int> contours(const Setting& setting,
+                          const std::vector<collision::Intersection>& found) {
+  Groups groups(static_cast<int>(found.size()));
+  std::map<std::pair<int, int>, int> first;  // crossing on two triangles
+  for (int i = 0; i < static_cast<int>(found.size()); ++i) {
+    const collision::Intersection& c = found[at(i)];
+    for_faces_beside(setting, setting.surface.edges[at(c.edge)], [&](int face) {
+      const auto key = std::minmax(face, c.triangle);
+      groups.join(i, first.try_emplace({key.first, key.second}, i).first->second);
+    });
+  }
+  return groups.all();
+}
+
 class CrossingPushes {
  public:
   CrossingPushes(const Setting& setting, const Tangle& tangle, const Positions& x, double step,
@@ -156,12 +146,23 @@ class CrossingPushes {
     for (const InsideMesh& in : tangle.in_mesh) inside_.insert({in.vertex, in.mesh});
   }
 
-  void add(const Crossing& c) {
-    const int mesh = mesh_of(c);
-    if (mesh >= 0)
-      out_of_mesh(c, mesh);
-    else if (!pull_back(c))
-      shorten(c);
+  void add_all(const std::vector<collision::Intersection>& found) {
+    const std::vector<int> contour = contours(setting_, found);
+    std::vector<char> pulled(found.size(), 0);  // by contour
+    std::vector<std::optional<Crossing>> open(found.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const auto c = crossing_at(setting_, found[i], x_);
+      if (!c) continue;
+      const int mesh = mesh_of(*c);
+      if (mesh >= 0)
+        out_of_mesh(*c, mesh);
+      else if (pull_back(*c))
+        pulled[at(contour[i])] = 1;
+      else
+        open[i] = c;
+    }
+    for (std::size_t i = 0; i < found.size(); ++i)
+      if (open[i] && !pulled[at(contour[i])]) shorten(*open[i]);
   }
 
  private:
@@ -193,7 +194,7 @@ class CrossingPushes {
   /// Back through the triangle with what has come through it.
   bool pull_back(const Crossing& c) {
     if (!setting_.surface.is_cloth(c.edge[0])) return false;
-    const auto end = regions_.smaller(c.edge);
+    const auto end = regions_.smaller_end(c.edge);
     if (!end) return false;
     const double height = c.height[*end];
     const double gap = 0.5 * setting_.distance_of(c.triangle[0]);
@@ -360,8 +361,7 @@ std::vector<Push> untangling_pushes(const Setting& setting, const Tangle& tangle
   push_out_of_meshes(setting, tangle, all, pushes);
   push_pierced_out(setting, tangle, all, pushes);
   CrossingPushes crossing_pushes(setting, tangle, all, step, pushes);
-  for (const collision::Intersection& found : tangle.crossings)
-      if (const auto crossing = crossing_at(setting, found, all)) crossing_pushes.add(*crossing);
+  crossing_pushes.add_all(tangle.crossings);
   return pushes;
 }
 

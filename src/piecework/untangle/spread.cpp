@@ -6,13 +6,12 @@
 namespace piecework::untangle {
 namespace {
 
-constexpr double kReach = 8;      ///< edges over which a push fades by a factor e
 constexpr double kStrength = 10;  ///< of a push against one edge
 
 SparseMatrix laplacian(const Setting& setting) {
   const int count = setting.model.num_vertices();
   std::vector<Eigen::Triplet<double, int>> entries;
-  for (int v = 0; v < count; ++v) entries.emplace_back(v, v, 1 / (kReach * kReach));
+  for (int v = 0; v < count; ++v) entries.emplace_back(v, v, 0);  // in the pattern
   for (const auto& [v, w] : setting.surface.edges) {
     if (!setting.surface.is_cloth(v)) continue;
     entries.emplace_back(v, v, 1);
@@ -30,10 +29,11 @@ SparseMatrix laplacian(const Setting& setting) {
 Spread::Spread(const Setting& setting)
     : setting_(setting), reduction_(setting.model, setting.held), laplacian_(laplacian(setting)) {}
 
-void Spread::move(const Displacements& wanted, Positions& x) {
+void Spread::move(const Displacements& wanted, double reach, Positions& x) {
   SparseMatrix A = laplacian_;
   Positions rhs = Positions::Zero(x.rows(), 3);
   for (int v = 0; v < setting_.model.num_vertices(); ++v) {
+    A.coeffRef(v, v) += 1 / (reach * reach);
     if (!wanted.pushed[static_cast<std::size_t>(v)]) continue;
     A.coeffRef(v, v) += kStrength;
     rhs.row(v) = kStrength * wanted.u.row(v);

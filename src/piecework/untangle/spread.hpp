@@ -21,8 +21,9 @@ class Spread {
   /// \param setting  must outlive this object
   explicit Spread(const Setting& setting);
 
+  /// \param reach  edges over which a displacement fades by a factor e: s = 1 / reach^2
   /// \throws SimulationError if the factor does not fit into memory
-  void move(const Displacements& wanted, Positions& x);
+  void move(const Displacements& wanted, double reach, Positions& x);
 
   /// Nothing can move.
   [[nodiscard]] bool empty() const { return reduction_.count() == 0; }
@@ -30,7 +31,7 @@ class Spread {
  private:
   const Setting& setting_;
   model::Reduction reduction_;
-  SparseMatrix laplacian_;  ///< L + s I
+  SparseMatrix laplacian_;  ///< L, |V| x |V|
   global::TreeSolver solver_;
   bool analyzed_ = false;
 };

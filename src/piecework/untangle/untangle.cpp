@@ -14,8 +14,9 @@ namespace {
 constexpr double kOpenTo = 0.5;       ///< of the contact distance: gaps that pushes aim at
 constexpr double kEnough = 0.1;       ///< of the contact distance: gaps to be content with
 constexpr int kOpeningRounds = 10;    ///< at most so many, once nothing is wrong
-const double kFirstStep = std::getenv("S0")?std::atof(std::getenv("S0")):0.25;   ///< mean edges
-const double kLargestStep = std::getenv("S1")?std::atof(std::getenv("S1")):1;    ///< mean edges
+const double kFirstStep = std::getenv("S0")?std::atof(std::getenv("S0")):0.03;   ///< mean edges
+const double kLargestStep = std::getenv("S1")?std::atof(std::getenv("S1")):0.5;
+const double kFirstReach=8, kLargestReach=std::getenv("R1")?std::atof(std::getenv("R1")):64;    ///< mean edges
 constexpr int kPatience = 4;          ///< rounds without progress until steps become longer
 
 /// How good positions are: what is wrong, then how much is too close.
@@ -52,13 +53,13 @@ class Untangling {
       if (wanted.u.isZero(0)) break;
       mark(wanted);
       ++report.rounds;
-      spread_.move(wanted, x);
+      spread_.move(wanted, reach_, x);
       now = examined(x);
       since_best = now.better_than(best) ? 0 : since_best + 1;
       if (since_best == 0) best = now;
       if (std::getenv("TRACE")) std::printf("  round %d edges %d inside %d close %zu step %g\n", report.rounds, now.tangle.count().edges, now.tangle.count().inside, now.too_close(), step_);
       if (since_best % kPatience == kPatience - 1)
-        step_ = std::min(2 * step_, kLargestStep * setting_.model.mean_edge);
+        lengthen();
     }
     x = best.x;
     report.after = best.tangle.count();
@@ -79,6 +80,11 @@ class Untangling {
     const Positions all = all_positions(setting_, state.x);
     if (state.wrong() > 0) return untangling_pushes(setting_, state.tangle, all, step_);
     return opening_pushes(find_close(setting_, all, marked_, kOpenTo));
+  }
+
+  void lengthen() {
+    step_ = std::min(2 * step_, kLargestStep * setting_.model.mean_edge);
+    reach_ = std::min(2 * reach_, kLargestReach);
   }
 
   void mark(const Displacements& wanted) {
@@ -105,6 +111,7 @@ class Untangling {
   Passed passed_;
   std::vector<char> marked_;  ///< vertices that were pushed
   double step_;               ///< m
+  double reach_ = kFirstReach;  ///< edges
 };
 
 }  // namespace
