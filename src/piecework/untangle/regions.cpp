@@ -9,7 +9,7 @@ namespace {
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-constexpr int kBridge = 2;  // edges around a cut that do not join regions
+constexpr int kBridge = 1;  // edges around a cut that do not join regions
 
 /// Uncut edges of cloth.
 mesh::Adjacency uncut_neighbours(const Setting& setting, const std::vector<char>& cut) {

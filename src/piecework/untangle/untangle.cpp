@@ -1,7 +1,6 @@
 #include <piecework/untangle/untangle.hpp>
 
 #include <algorithm>
-#include <cmath>
 
 #include "pushes.hpp"
 #include "setting.hpp"
@@ -14,9 +13,10 @@ namespace {
 constexpr double kOpenTo = 0.5;       ///< of the contact distance: gaps that pushes aim at
 constexpr double kEnough = 0.1;       ///< of the contact distance: gaps to be content with
 constexpr int kOpeningRounds = 10;    ///< at most so many, once nothing is wrong
-const double kFirstStep = std::getenv("S0")?std::atof(std::getenv("S0")):0.03;   ///< mean edges
-const double kLargestStep = std::getenv("S1")?std::atof(std::getenv("S1")):0.5;
-const double kFirstReach=8, kLargestReach=std::getenv("R1")?std::atof(std::getenv("R1")):64;    ///< mean edges
+constexpr double kFirstStep = 0.03;   ///< mean edges
+constexpr double kLargestStep = 0.5;  ///< mean edges
+constexpr double kFirstReach = 8;     ///< edges
+constexpr double kLargestReach = 64;  ///< edges
 constexpr int kPatience = 4;          ///< rounds without progress until steps become longer
 
 /// How good positions are: what is wrong, then how much is too close.
@@ -57,7 +57,6 @@ class Untangling {
       now = examined(x);
       since_best = now.better_than(best) ? 0 : since_best + 1;
       if (since_best == 0) best = now;
-      if (std::getenv("TRACE")) std::printf("  round %d edges %d inside %d close %zu step %g\n", report.rounds, now.tangle.count().edges, now.tangle.count().inside, now.too_close(), step_);
       if (since_best % kPatience == kPatience - 1)
         lengthen();
     }

@@ -1,0 +1,4 @@
+#include <piecework/runner/start.hpp>
+
+#include <gtest/gtest.h>
+TEST(Start, Later) {}
