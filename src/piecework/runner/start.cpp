@@ -19,10 +19,9 @@ std::size_t count_crossings(const World& world, const Positions& x) {
   obstacles.place(0, placed);
   Positions all(x.rows() + placed.rows(), 3);
   all << x, placed;
-  const collision::Surface surface =
-      collision::make_surface(world.model.triangles, world.model.num_vertices(),
-                              obstacles.triangles(), obstacles.num_vertices(),
-                              world.scene.self_collision);
+  const collision::Surface surface = collision::make_surface(
+      world.model.triangles, world.model.num_vertices(), obstacles.triangles(),
+      obstacles.num_vertices(), world.scene.self_collision);
   return collision::find_intersections(surface, all).size();
 }
 
@@ -56,7 +55,8 @@ void prepare_start(World& world, int inside_solids) {
   if (crossings == 0 && inside_solids == 0) return;
   if (world.scene.contact.untangle == 0) {
     world.notes.push_back(fmt::format(
-        "start: {} edges pass through triangles and {} vertices are inside of bodies; no step takes "
+        "start: {} edges pass through triangles and {} vertices are inside of bodies; no step "
+        "takes "
         "edges out of triangles: move cloths or colliders apart, or switch /contact/untangle on",
         crossings, inside_solids));
     return;

@@ -30,10 +30,10 @@ Vec3 area_normal(const Triangle& t, const Positions& x) {
 struct Crossing {
   EdgeVertices edge;
   Triangle triangle;
-  Vec3 along, normal;               ///< unit vectors
-  double u;                         ///< along the edge, 0 to 1
-  std::array<double, 3> weight;     ///< of the corners
-  std::array<double, 2> height;     ///< of the ends above the triangle's plane, m
+  Vec3 along, normal;            ///< unit vectors
+  double u;                      ///< along the edge, 0 to 1
+  std::array<double, 3> weight;  ///< of the corners
+  std::array<double, 2> height;  ///< of the ends above the triangle's plane, m
 };
 
 /// Nothing: edge or triangle has no size, and says nothing of directions.
@@ -49,9 +49,9 @@ std::optional<Crossing> crossing_at(const Setting& setting, const collision::Int
   const double difference = c.height[0] - c.height[1];
   c.u = difference == 0 ? 0.5 : std::clamp(c.height[0] / difference, 0.0, 1.0);
   const Vec3 point = p + c.u * (q - p);
-  const auto beta = collision::closest_vertex_triangle(
-                        {point, a, x.row(c.triangle[1]), x.row(c.triangle[2])})
-                        .beta;
+  const auto beta =
+      collision::closest_vertex_triangle({point, a, x.row(c.triangle[1]), x.row(c.triangle[2])})
+          .beta;
   c.weight = {-beta[1], -beta[2], -beta[3]};
   return c;
 }
@@ -66,9 +66,7 @@ void for_faces_beside(const Setting& setting, const EdgeVertices& edge, const Vi
   }
 }
 
-Push vertex_push(int vertex, const Vec3& way) {
-  return {{vertex}, {1}, unit(way), way.norm()};
-}
+Push vertex_push(int vertex, const Vec3& way) { return {{vertex}, {1}, unit(way), way.norm()}; }
 
 /// Edge and triangle apart, by `way` of the edge relative to the triangle.
 Push apart(const Crossing& c, const Vec3& way) {
@@ -122,8 +120,8 @@ Vec3 lifting_direction(const Setting& setting, const Crossing& c, const Position
   return along_own ? own : Vec3(-c.normal);
 }
 
-/// Which crossings lie on one contour of intersection: those on the same two triangles. Per crossing
-/// the first one of its contour.
+/// Which crossings lie on one contour of intersection: those on the same two triangles. Per
+/// crossing the first one of its contour.
 std::vector<int> contours(const Setting& setting,
                           const std::vector<collision::Intersection>& found) {
   Groups groups(static_cast<int>(found.size()));
@@ -142,7 +140,11 @@ class CrossingPushes {
  public:
   CrossingPushes(const Setting& setting, const Tangle& tangle, const Positions& x, double step,
                  std::vector<Push>& pushes)
-      : setting_(setting), x_(x), step_(step), regions_(setting, tangle.crossings), pushes_(pushes) {
+      : setting_(setting),
+        x_(x),
+        step_(step),
+        regions_(setting, tangle.crossings),
+        pushes_(pushes) {
     for (const InsideMesh& in : tangle.in_mesh) inside_.insert({in.vertex, in.mesh});
   }
 
@@ -245,7 +247,8 @@ void push_out_of_meshes(const Setting& setting, const Tangle& tangle, const Posi
     const double gap = 0.5 * closed.distance;
     const Vec3 way = foot.point + gap * foot.outward - p;
     const Vec3 normal = normals.row(v);
-    if (depth <= gap || std::abs(unit(way).dot(normal)) > kAcross) pushes.push_back(vertex_push(v, way));
+    if (depth <= gap || std::abs(unit(way).dot(normal)) > kAcross)
+      pushes.push_back(vertex_push(v, way));
   }
 }
 
@@ -284,7 +287,7 @@ PiercedTriangles pierced_triangles(const Setting& setting, const Tangle& tangle,
 
 /// Triangles out of meshes that they are pierced by, though their corners may be outside.
 void push_pierced_out(const Setting& setting, const Tangle& tangle, const Positions& x,
-                               std::vector<Push>& pushes) {
+                      std::vector<Push>& pushes) {
   const PiercedTriangles pierced = pierced_triangles(setting, tangle, x);
   for (int m = 0; m < static_cast<int>(setting.closed.size()); ++m) {
     const ClosedMesh& closed = setting.closed[at(m)];
@@ -311,8 +314,7 @@ void push_out_of_bodies(const Setting& setting, const Tangle& tangle, const Posi
   for (const auto& [v, body] : tangle.in_body) {
     const auto& [distance, normal] =
         setting.bodies[at(body)].signed_distance(x.row(v), setting.poses[at(body)]);
-    pushes.push_back(
-        vertex_push(v, (0.5 * setting.distance_of_body(body) - distance) * normal));
+    pushes.push_back(vertex_push(v, (0.5 * setting.distance_of_body(body) - distance) * normal));
   }
 }
 

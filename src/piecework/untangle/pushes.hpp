@@ -32,8 +32,8 @@ struct Displacements {
 
 /// Pushes that undo a tangle.
 /// \param step  how far to go where only a direction is known, m
-std::vector<Push> untangling_pushes(const Setting& setting, const Tangle& tangle, const Positions& all,
-                                    double step);
+std::vector<Push> untangling_pushes(const Setting& setting, const Tangle& tangle,
+                                    const Positions& all, double step);
 
 /// Pushes that open the gaps to what is wanted.
 std::vector<Push> opening_pushes(const Closeness& close);

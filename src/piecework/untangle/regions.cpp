@@ -32,8 +32,8 @@ mesh::Adjacency uncut_neighbours(const Setting& setting, const std::vector<char>
   return neighbours;
 }
 
-/// Goes outward from the vertices in `front`, ring by ring, up to `rings`; calls visit(from, to) for
-/// every edge to a vertex and goes on from there if that is true.
+/// Goes outward from the vertices in `front`, ring by ring, up to `rings`; calls visit(from, to)
+/// for every edge to a vertex and goes on from there if that is true.
 template <class Visit>
 void flood(const mesh::Adjacency& neighbours, std::vector<int> front, int rings,
            const Visit& visit) {

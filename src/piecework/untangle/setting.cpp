@@ -15,9 +15,8 @@ std::vector<int> pieces(const model::ClothModel& model, const collision::Surface
   for (const auto& [v, w] : surface.edges)
     if (surface.is_cloth(v)) groups.join(v, w);
   for (const int slave : model.sewing.map().slaves)
-    model.sewing.map().visit_carriers(slave, [&](int carrier, double) {
-      groups.join(slave, carrier);
-    });
+    model.sewing.map().visit_carriers(slave,
+                                      [&](int carrier, double) { groups.join(slave, carrier); });
   return groups.all();
 }
 
@@ -56,9 +55,8 @@ Setting::Setting(const model::ClothModel& cloth, const contact::Colliders& colli
       held(held_vertices),
       distance(options.distance),
       obstacles(colliders.meshes),
-      surface(collision::make_surface(cloth.triangles, cloth.num_vertices(),
-                                      obstacles.triangles(), obstacles.num_vertices(),
-                                      options.self)),
+      surface(collision::make_surface(cloth.triangles, cloth.num_vertices(), obstacles.triangles(),
+                                      obstacles.num_vertices(), options.self)),
       triangles_at(mesh::vertex_triangles(surface.triangles, surface.num_vertices)),
       piece(pieces(cloth, surface)),
       closed(closed_meshes(colliders, cloth.num_vertices(), options.distance)),

@@ -20,10 +20,10 @@ namespace piecework::untangle {
 /// A mesh with an inside.
 struct ClosedMesh {
   Triangles triangles;
-  Positions x;           ///< m
-  int first_vertex;      ///< of the surface
-  double distance;       ///< at which contact begins, m
-  double orientation;    ///< 1 if triangles face outward, -1 if inward
+  Positions x;         ///< m
+  int first_vertex;    ///< of the surface
+  double distance;     ///< at which contact begins, m
+  double orientation;  ///< 1 if triangles face outward, -1 if inward
   NearestSurface way_out;
 };
 

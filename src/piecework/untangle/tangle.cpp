@@ -24,7 +24,8 @@ void note_passed(const Setting& setting, const collision::Intersection& crossing
 void find_inside_meshes(const Setting& setting, const Positions& all, const Passed& passed,
                         std::vector<InsideMesh>& inside) {
   const auto is_passed = [&](int mesh) {
-    return std::any_of(passed.begin(), passed.end(), [&](const auto& p) { return p.second == mesh; });
+    return std::any_of(passed.begin(), passed.end(),
+                       [&](const auto& p) { return p.second == mesh; });
   };
   for (int mesh = 0; mesh < static_cast<int>(setting.closed.size()); ++mesh) {
     if (!is_passed(mesh)) continue;
@@ -39,7 +40,8 @@ void find_inside_bodies(const Setting& setting, const Positions& all,
                         std::vector<InsideBody>& inside) {
   for (int body = 0; body < static_cast<int>(setting.bodies.size()); ++body)
     for (int v = 0; v < setting.model.num_vertices(); ++v)
-      if (setting.bodies[at(body)].signed_distance(all.row(v), setting.poses[at(body)]).distance < 0)
+      if (setting.bodies[at(body)].signed_distance(all.row(v), setting.poses[at(body)]).distance <
+          0)
         inside.push_back({v, body});
 }
 
@@ -90,14 +92,15 @@ Closeness find_close(const Setting& setting, const Positions& all, const std::ve
     if (!any_marked(v, setting, marked) || are_joined(setting, v, first_count)) return;
     const double wanted =
         part * std::max(setting.distance_of(v[0]), setting.distance_of(v[first_count]));
-    const collision::Closest closest = collision::closest(
-        kind, {all.row(v[0]), all.row(v[1]), all.row(v[2]), all.row(v[3])});
+    const collision::Closest closest =
+        collision::closest(kind, {all.row(v[0]), all.row(v[1]), all.row(v[2]), all.row(v[3])});
     if (closest.distance_sq < wanted * wanted) close.pairs.push_back({v, closest, wanted});
   };
   std::vector<collision::VertexBox> boxes;
   for (Eigen::Index v = 0; v < all.rows(); ++v) boxes.push_back({all.row(v), all.row(v)});
   collision::BroadPhase broad_phase(setting.surface);
-  const double reach = part * std::max(setting.distance, setting.obstacles.distance(setting.distance));
+  const double reach =
+      part * std::max(setting.distance, setting.obstacles.distance(setting.distance));
   const collision::CandidatePairs& pairs = broad_phase.find(boxes, reach);
   for (const auto& [v, t] : pairs.vertex_triangle) {
     const Triangle& triangle = setting.surface.triangles[at(t)];

@@ -57,8 +57,7 @@ class Untangling {
       now = examined(x);
       since_best = now.better_than(best) ? 0 : since_best + 1;
       if (since_best == 0) best = now;
-      if (since_best % kPatience == kPatience - 1)
-        lengthen();
+      if (since_best % kPatience == kPatience - 1) lengthen();
     }
     x = best.x;
     report.after = best.tangle.count();
@@ -108,8 +107,8 @@ class Untangling {
   UntangleOptions options_;
   Spread spread_;
   Passed passed_;
-  std::vector<char> marked_;  ///< vertices that were pushed
-  double step_;               ///< m
+  std::vector<char> marked_;    ///< vertices that were pushed
+  double step_;                 ///< m
   double reach_ = kFirstReach;  ///< edges
 };
 

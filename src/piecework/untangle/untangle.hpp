@@ -13,7 +13,7 @@
 namespace piecework::untangle {
 
 struct UntangleOptions {
-  int rounds = 100;       ///< at most so many
+  int rounds = 100;        ///< at most so many
   double distance = 1e-3;  ///< contact distance of what has none of its own, m
   bool self = false;       ///< cloth collides with cloth
 };

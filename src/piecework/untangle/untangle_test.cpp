@@ -1,60 +1,305 @@
 #include <piecework/untangle/untangle.hpp>
-#include <gtest/gtest.h>
-#include <iostream>
+
+#include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
+
+#include <gtest/gtest.h>
+
+#include <piecework/core/error.hpp>
+#include <piecework/core/parallel.hpp>
 #include <piecework/mesh/solids.hpp>
+
 #include "untangle_test_util.hpp"
+
 namespace piecework::untangle {
 namespace {
-void show(const char* name, TangledCloth& c) {
-  const auto before = c.intersections();
-  const auto r = c.untangle();
-  const auto s = c.stretches();
-  std::cout << name << ": exact " << before << " -> " << c.intersections() << "; edges " << r.before.edges << "->" << r.after.edges
-            << " inside " << r.before.inside << "->" << r.after.inside << " rounds " << r.rounds << " move " << r.largest_move
-            << " stretch " << s[0] << " .. " << s[1] << "\n";
+
+mesh::TriangleMesh moved(mesh::TriangleMesh mesh, const Vec3& by) {
+  mesh.positions.rowwise() += by.transpose();
+  return mesh;
 }
-mesh::TriangleMesh vertical(double size, int n, double x0, double y0, double z0) {
-  auto m = testing::grid_mesh(n, n, size);
-  Positions p = m.positions;
-  m.positions.col(0) = p.col(0).array() + x0;
-  m.positions.col(1) = p.col(2).array() + y0;
-  m.positions.col(2).setConstant(z0);
-  return m;
+
+/// In the xy plane.
+mesh::TriangleMesh upright(int side, double size, const Vec3& corner) {
+  mesh::TriangleMesh mesh = testing::grid_mesh(side, side, size);
+  mesh.positions.col(1).swap(mesh.positions.col(2));
+  return moved(mesh, corner);
 }
-colliders::MeshCollider body(const mesh::TriangleMesh& m, Vec3 at) {
-  Eigen::Affine3d a = Eigen::Affine3d::Identity(); a.translation() = at;
-  return {{.name = "b"}, m, a, {}};
+
+mesh::TriangleMesh tube(double radius, int columns, int rows) {
+  mesh::TriangleMesh mesh;
+  mesh.positions.resize(columns * rows, 3);
+  for (int j = 0; j < rows; ++j)
+    for (int i = 0; i < columns; ++i) {
+      const double angle = 2 * std::numbers::pi * i / columns;
+      mesh.positions.row(j * columns + i) << radius * std::cos(angle), 0.05 * j,
+          radius * std::sin(angle);
+    }
+  for (int j = 0; j + 1 < rows; ++j)
+    for (int i = 0; i < columns; ++i) {
+      const int a = j * columns + i, b = j * columns + (i + 1) % columns;
+      mesh.triangles.push_back({a, a + columns, b});
+      mesh.triangles.push_back({b, a + columns, b + columns});
+    }
+  return mesh;
 }
-TEST(Explore, All) {
-  { TangledCloth c(testing::disjoint_union(testing::grid_mesh(21, 21), vertical(1, 21, 0.013, -0.487, 0.507))); show("perpendicular", c); }
-  { TangledCloth c(testing::disjoint_union(testing::grid_mesh(21, 21), vertical(1, 21, 0.013, -0.187, 0.507))); show("perpendicular 0.19", c); }
-  { TangledCloth c(testing::disjoint_union(testing::grid_mesh(21, 21), vertical(0.5, 11, 0.213, -0.187, 0.507))); show("narrow 0.19", c); }
-  { TangledCloth c(testing::disjoint_union(testing::grid_mesh(21, 21), vertical(1, 21, 0.513, -0.487, 0.507))); show("crossing at borders", c); }
-  { auto a = testing::grid_mesh(21, 21); auto b = a; b.positions.col(1) = 0.02 + 0.05*(a.positions.col(0).array()*9).sin(); 
-    b.positions.col(0).array() += 0.003; b.positions.col(2).array() += 0.007; TangledCloth c(testing::disjoint_union(a, b)); show("waves", c); }
-  { auto a = testing::grid_mesh(21, 21); TangledCloth c(a); c.x(220,1)=0; // fold
-    for (int v=0; v<c.x.rows(); ++v){ double s=c.model.start(v,0); double t=(s-0.5)*5.2; c.x(v,0)=0.3*std::sin(t)*1.0; c.x(v,1)=0.3*(1-std::cos(t)); c.x(v,2)+=0.01*s; 
-      if(s>0.8) {c.x(v,0)-=0;} }
-    for (int v=0; v<c.x.rows(); ++v){ double s=c.model.start(v,0); if (s<0.5) c.x(v,0)+=0; double t=(s-0.5)*7.0; c.x(v,0)=std::sin(t)/7.0; c.x(v,1)=(1-std::cos(t))/7.0; c.x(v,2)=c.model.start(v,2)+0.0*s; }
-    show("loop", c); }
-  { TangledCloth c(testing::grid_mesh(21, 21)); c.meshes.push_back(body(mesh::icosphere(0.3, 8), {0.5, -0.2, 0.5})); show("icosphere cap", c); }
-  { TangledCloth c(testing::grid_mesh(21, 21)); c.meshes.push_back(body(mesh::icosphere(0.3, 8), {0.5, -0.05, 0.5})); show("icosphere nearly half", c); }
-  { TangledCloth c(testing::grid_mesh(21, 21)); c.meshes.push_back(body(mesh::icosphere(0.3, 8), {0.0, 0.01, 0.5})); show("icosphere from aside", c); }
-  { TangledCloth c(testing::grid_mesh(21, 21,0.5)); c.meshes.push_back(body(mesh::box({1,0.4,1}), {-0.3, 0.05, 0.25})); show("box from aside", c); }
-  { TangledCloth c(testing::grid_mesh(21, 21,1)); c.meshes.push_back(body(mesh::box({0.5,0.4,0.5}), {0.5, -0.15, 0.5})); show("box below", c); }
-  { TangledCloth c(testing::grid_mesh(21, 21,1)); c.meshes.push_back(body(mesh::box({0.5,0.4,0.5}), {0.5, -0.2, 0.5})); show("box coplanar", c); }
-  { TangledCloth c(testing::grid_mesh(21, 21)); c.options.self=false; c.bodies.push_back({{.name="s"}, colliders::Sphere{{0.5,-0.2,0.5},0.3}, Eigen::Isometry3d::Identity(), {}}); show("analytic sphere", c); }
-  { TangledCloth c(testing::disjoint_union(testing::grid_mesh(21, 21), testing::grid_mesh(21, 21))); show("identical", c); }
-  { auto b = testing::grid_mesh(21,21); b.positions.col(0).array() += 0.31; TangledCloth c(testing::disjoint_union(testing::grid_mesh(21, 21), b)); show("coplanar", c); }
-  { auto a=testing::grid_mesh(21,21); auto b=a; b.positions.col(1).array()+=0.01; TangledCloth c(testing::disjoint_union(a,b)); c.x(220,1)=0.05; show("one vertex", c); }
-  { auto a=testing::grid_mesh(21,21); auto b=a; b.positions.col(1).array()-=0.01; b.positions.col(0).array()+=0.613; b.positions.col(2).array()+=0.613;
-    TangledCloth c(testing::disjoint_union(a,b)); c.x(441,1)=0.05; show("corner", c); }
-  auto tube=[](double r,int n,int rows){ mesh::TriangleMesh m; for(int j=0;j<rows;++j)for(int i=0;i<n;++i){} 
-    m.positions.resize(n*rows,3); for(int j=0;j<rows;++j)for(int i=0;i<n;++i){double a=2*std::numbers::pi*i/n; m.positions.row(j*n+i)<<r*std::cos(a),0.05*j,r*std::sin(a);}
-    for(int j=0;j+1<rows;++j)for(int i=0;i<n;++i){int a=j*n+i,b=j*n+(i+1)%n; m.triangles.push_back({a,a+n,b}); m.triangles.push_back({b,a+n,b+n});} return m; };
-  { auto a=tube(0.3,40,20), b=tube(0.32,37,20); b.positions.col(0).array()+=0.05; b.positions.col(1).array()-=0.013; TangledCloth c(testing::disjoint_union(a,b)); show("tubes", c); }
-  { TangledCloth c(tube(0.3,40,20)); auto b=mesh::lathe(std::vector<Vec2>{{0,-0.3},{0.31,-0.3},{0.31,1.3},{0,1.3}},48); c.meshes.push_back(body(b,{0,0,0})); show("tube in cylinder body", c); }
-  { TangledCloth c(tube(0.3,40,20)); auto b=mesh::icosphere(0.33,10); c.meshes.push_back(body(b,{0,0.45,0})); show("tube around sphere", c); }
+
+mesh::TriangleMesh sheet() { return testing::grid_mesh(21, 21); }
+
+TangledCloth two(const mesh::TriangleMesh& other) {
+  return TangledCloth(testing::disjoint_union(sheet(), other));
 }
-}}
+
+TangledCloth wavy_sheet_in_flat_one() {
+  mesh::TriangleMesh wavy = moved(sheet(), {0.003, 0.02, 0.007});
+  for (Eigen::Index v = 0; v < wavy.positions.rows(); ++v)
+    wavy.positions(v, 1) += 0.05 * std::sin(9 * wavy.positions(v, 0));
+  return two(wavy);
+}
+
+/// Rolled up a little more than once around.
+TangledCloth rolled_sheet() {
+  TangledCloth cloth(sheet());
+  for (Eigen::Index v = 0; v < cloth.x.rows(); ++v) {
+    const double angle = 7 * (cloth.x(v, 0) - 0.5);
+    cloth.x(v, 0) = std::sin(angle) / 7;
+    cloth.x(v, 1) = (1 - std::cos(angle)) / 7;
+  }
+  return cloth;
+}
+
+TangledCloth poking_vertex(int vertex) {
+  TangledCloth cloth = two(moved(sheet(), {0.003, -0.01, 0.007}));
+  cloth.x(vertex, 1) = -0.05;
+  return cloth;
+}
+
+TangledCloth over(const mesh::TriangleMesh& cloth, const mesh::TriangleMesh& body, const Vec3& at) {
+  TangledCloth tangled(cloth);
+  tangled.add(body, at);
+  return tangled;
+}
+
+struct Case {
+  const char* name;
+  std::function<TangledCloth()> make;
+  double longest;  ///< an edge afterwards, as part of its length before
+};
+
+class Tangles : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Tangles, AreTakenApart) {
+  TangledCloth cloth = GetParam().make();
+  const std::size_t before = cloth.intersections();
+  ASSERT_GT(before, 0U);
+  const Positions start = cloth.x;
+  const UntangleReport report = cloth.untangle();
+  EXPECT_EQ(cloth.intersections(), 0U);
+  EXPECT_EQ(report.before.edges, static_cast<int>(before));
+  EXPECT_EQ(report.after.total(), 0);
+  EXPECT_FALSE(report.left_at);
+  EXPECT_GT(report.rounds, 0);
+  EXPECT_EQ(report.largest_move, (cloth.x - start).rowwise().norm().maxCoeff());
+  EXPECT_LT(cloth.stretches()[1], GetParam().longest);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, Tangles,
+    ::testing::Values(Case{"SheetsAcross",
+                           [] {
+                             return two(upright(21, 1, {0.013, -0.487, 0.507}));
+                           },
+                           4},
+                      Case{"NarrowSheetAcross",
+                           [] {
+                             return two(upright(11, 0.5, {0.213, -0.187, 0.507}));
+                           },
+                           2},
+                      Case{"BordersAcross",
+                           [] {
+                             return two(upright(21, 1, {0.513, -0.487, 0.507}));
+                           },
+                           10},
+                      Case{"WavySheet", wavy_sheet_in_flat_one, 8},
+                      Case{"RolledSheet", rolled_sheet, 1.2},
+                      Case{"OneVertex", [] { return poking_vertex(220); }, 2},
+                      Case{"Corner", [] { return poking_vertex(0); }, 2},
+                      Case{"CoplanarSheets",
+                           [] {
+                             return two(moved(sheet(), {0.31, 0, 0}));
+                           },
+                           1.1},
+                      Case{"IdenticalSheets", [] { return two(sheet()); }, 1.1},
+                      Case{"TubeThroughTube",
+                           [] {
+                             return TangledCloth(testing::disjoint_union(
+                                 tube(0.3, 40, 20), moved(tube(0.32, 37, 20), {0.05, -0.013, 0})));
+                           },
+                           2},
+                      Case{"CapOfSphere",
+                           [] {
+                             return over(sheet(), mesh::icosphere(0.3, 8), {0.5, -0.2, 0.5});
+                           },
+                           2},
+                      Case{"BoxBelow",
+                           [] {
+                             return over(sheet(), mesh::box({0.5, 0.4, 0.5}), {0.5, -0.15, 0.5});
+                           },
+                           3},
+                      Case{"OnBox",
+                           [] {
+                             return over(sheet(), mesh::box({0.5, 0.4, 0.5}), {0.5, -0.2, 0.5});
+                           },
+                           1.1},
+                      Case{"BoxFromAside",
+                           [] {
+                             return over(testing::grid_mesh(21, 21, 0.5), mesh::box({1, 0.4, 1}),
+                                         {-0.3, 0.05, 0.25});
+                           },
+                           8},
+                      Case{
+                          "TubeAroundSphere",
+                          [] {
+                            return over(tube(0.3, 40, 20), mesh::icosphere(0.33, 10), {0, 0.45, 0});
+                          },
+                          1.3}),
+    [](const auto& tested) { return std::string(tested.param.name); });
+
+TangledCloth sheet_in_ball() {
+  TangledCloth cloth(sheet());
+  cloth.bodies.push_back({{.name = "ball"},
+                          colliders::Sphere{{0.5, -0.2, 0.5}, 0.3},
+                          Eigen::Isometry3d::Identity(),
+                          {}});
+  return cloth;
+}
+
+int inside_ball(const TangledCloth& cloth, double radius) {
+  return static_cast<int>(
+      ((cloth.x.rowwise() - Eigen::RowVector3d(0.5, -0.2, 0.5)).rowwise().norm().array() < radius)
+          .count());
+}
+
+TEST(Untangle, VerticesLeaveSolids) {
+  TangledCloth cloth = sheet_in_ball();
+  const int before = inside_ball(cloth, 0.3);
+  ASSERT_GT(before, 20);
+  const UntangleReport report = cloth.untangle();
+  EXPECT_EQ(report.before.inside, before);
+  EXPECT_EQ(report.after.inside, 0);
+  EXPECT_EQ(inside_ball(cloth, 0.3 + 0.1 * cloth.options.distance), 0) << "with a gap";
+  EXPECT_EQ(cloth.intersections(), 0U);
+  EXPECT_LT(cloth.stretches()[1], 2);
+}
+
+TEST(Untangle, PinnedVerticesStayAndAreReported) {
+  TangledCloth cloth = sheet_in_ball();
+  constexpr int kMiddle = 220;
+  ASSERT_GE(inside_ball(cloth, 0.3), 1);
+  cloth.held[kMiddle] = 1;
+  const Positions start = cloth.x;
+  const UntangleReport report = cloth.untangle();
+  EXPECT_TRUE(cloth.x.row(kMiddle) == start.row(kMiddle));
+  EXPECT_EQ(inside_ball(cloth, 0.3), report.after.inside);
+  EXPECT_GE(report.after.inside, 1);
+  EXPECT_TRUE(report.left_at.has_value());
+  EXPECT_TRUE(cloth.x.allFinite());
+}
+
+TEST(Untangle, WhereAllIsPinnedNothingMoves) {
+  TangledCloth cloth = wavy_sheet_in_flat_one();
+  std::fill(cloth.held.begin(), cloth.held.end(), char{1});
+  const Positions start = cloth.x;
+  const UntangleReport report = cloth.untangle();
+  EXPECT_GT(report.before.edges, 0);
+  EXPECT_EQ(report.after.edges, report.before.edges);
+  EXPECT_TRUE(cloth.x == start);
+}
+
+TEST(Untangle, WhatIsApartStaysBitForBit) {
+  TangledCloth cloth = over(sheet(), mesh::icosphere(0.3, 8), {0.5, 0, 0.5});
+  cloth.x.col(1).array() += 0.31;
+  ASSERT_EQ(cloth.intersections(), 0U);
+  const Positions start = cloth.x;
+  EXPECT_EQ(cloth.untangle().rounds, 0);
+  EXPECT_TRUE(cloth.x == start);
+}
+
+TEST(Untangle, ClothThatLiesInAClosedMeshMayStay) {
+  TangledCloth cloth = over(testing::grid_mesh(11, 11, 0.2), mesh::icosphere(0.5, 6), {0, 0, 0});
+  const Positions start = cloth.x;
+  EXPECT_EQ(cloth.untangle().before.total(), 0);
+  EXPECT_TRUE(cloth.x == start);
+}
+
+TEST(Untangle, AMeshInsideOutIsLeftByItsOutsideToo) {
+  mesh::TriangleMesh ball = mesh::icosphere(0.3, 8);
+  for (Triangle& t : ball.triangles) std::swap(t[1], t[2]);
+  TangledCloth cloth = over(sheet(), ball, {0.5, -0.2, 0.5});
+  ASSERT_GT(cloth.intersections(), 0U);
+  EXPECT_EQ(cloth.untangle().after.total(), 0);
+  EXPECT_EQ(inside_ball(cloth, 0.29), 0);
+}
+
+TEST(Untangle, AnOpenMeshIsLeftByContours) {
+  mesh::TriangleMesh bowl = mesh::icosphere(0.3, 8);
+  std::erase_if(bowl.triangles, [&](const Triangle& t) {
+    return bowl.positions(t[0], 1) < -0.1;  // no bottom
+  });
+  TangledCloth cloth = over(sheet(), bowl, {0.5, -0.27, 0.5});
+  ASSERT_FALSE(cloth.meshes[0].closed());
+  ASSERT_GT(cloth.intersections(), 0U);
+  EXPECT_EQ(cloth.untangle().after.total(), 0);
+  EXPECT_EQ(cloth.intersections(), 0U);
+}
+
+TEST(Untangle, TooFewRoundsKeepTheBestState) {
+  TangledCloth cloth = wavy_sheet_in_flat_one();
+  cloth.options.rounds = 5;
+  const auto before = static_cast<int>(cloth.intersections());
+  const UntangleReport report = cloth.untangle();
+  EXPECT_EQ(report.rounds, 5);
+  EXPECT_GT(report.after.edges, 0);
+  EXPECT_LE(report.after.edges, before);
+  EXPECT_EQ(static_cast<std::size_t>(report.after.edges), cloth.intersections());
+  EXPECT_TRUE(report.left_at.has_value());
+}
+
+TEST(Untangle, DegenerateStartsEndWithFiniteNumbers) {
+  TangledCloth point = two(sheet()), line = two(sheet());
+  point.x.setZero();
+  line.x.rightCols<2>().setZero();
+  for (TangledCloth* cloth : {&point, &line}) {
+    cloth->options.rounds = 3;
+    ASSERT_GT(cloth->intersections(), 0U);
+    EXPECT_GT(cloth->untangle().after.edges, 0);
+    EXPECT_TRUE(cloth->x.allFinite());
+  }
+}
+
+TEST(Untangle, PositionsThatAreNotFiniteAreRefused) {
+  TangledCloth cloth = two(sheet());
+  cloth.x(5, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(cloth.untangle(), SimulationError);
+}
+
+TEST(Untangle, SameBitsForEveryThreadCount) {
+  const auto untangled = [](int threads) {
+    ThreadPool pool(threads);
+    return pool.run([] {
+      TangledCloth cloth = two(moved(sheet(), {0.003, -0.01, 0.007}));
+      cloth.x(220, 1) = -0.05;
+      cloth.add(mesh::icosphere(0.3, 8), {0.5, -0.28, 0.5});
+      EXPECT_GT(cloth.intersections(), 0U);
+      EXPECT_EQ(cloth.untangle().after.total(), 0);
+      return cloth.x;
+    });
+  };
+  const Positions reference = untangled(1);
+  for (const int threads : {2, 5, 8}) EXPECT_TRUE(untangled(threads) == reference) << threads;
+}
+
+}  // namespace
+}  // namespace piecework::untangle

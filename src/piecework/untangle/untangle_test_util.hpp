@@ -3,6 +3,8 @@
 // Tangled cloths, and an account of them that shares no code with what untangles them.
 
 #include <algorithm>
+#include <array>
+#include <utility>
 #include <vector>
 
 #include <piecework/collision/intersections.hpp>
@@ -20,14 +22,19 @@ struct TangledCloth {
   Positions x;
 
   explicit TangledCloth(const mesh::TriangleMesh& cloth)
-      : TangledCloth(testing::cloth_model(cloth, testing::cotton())) {}
-  explicit TangledCloth(model::ClothModel cloth)
-      : model(std::move(cloth)),
+      : model(testing::cloth_model(cloth, testing::cotton())),
         held(static_cast<std::size_t>(model.num_vertices()), 0),
         x(model.start) {}
 
   UntangleReport untangle() {
     return piecework::untangle::untangle(model, {bodies, meshes}, held, options, x);
+  }
+
+  void add(const mesh::TriangleMesh& body, const Vec3& at) {
+    Eigen::Affine3d placement = Eigen::Affine3d::Identity();
+    placement.translation() = at;
+    meshes.emplace_back(colliders::Traits{.name = "body"}, body, placement,
+                        colliders::RigidMotion{});
   }
 
   /// Edges through triangles, by exact arithmetic.
@@ -39,16 +46,16 @@ struct TangledCloth {
       const int first = static_cast<int>(all.rows() - x.rows());
       for (const Triangle& t : mesh.triangles())
         triangles.push_back({first + t[0], first + t[1], first + t[2]});
-      all.conservativeResize(all.rows() + one.rows(), 3);
+      all.conservativeResize(all.rows() + one.rows(), Eigen::NoChange);
       all.bottomRows(one.rows()) = one;
     }
-    const auto surface = collision::make_surface(model.triangles, model.num_vertices(), triangles,
-                                                 static_cast<int>(all.rows() - x.rows()),
-                                                 options.self);
+    const auto surface =
+        collision::make_surface(model.triangles, model.num_vertices(), triangles,
+                                static_cast<int>(all.rows() - x.rows()), options.self);
     return collision::find_intersections(surface, all).size();
   }
 
-  /// The longest an edge of cloth has become, and the shortest, as parts of its rest length.
+  /// The shortest and the longest that an edge has become, as parts of its length in `start`.
   [[nodiscard]] std::array<double, 2> stretches() const {
     std::array<double, 2> range{1e300, 0};
     for (const Triangle& t : model.triangles)
