@@ -1,6 +1,7 @@
 #include <piecework/runner/bodies.hpp>
 
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -8,7 +9,6 @@
 #include <piecework/colliders/audit.hpp>
 #include <piecework/colliders/sequence.hpp>
 #include <piecework/colliders/tessellation.hpp>
-#include <piecework/collision/intersections.hpp>
 #include <piecework/core/error.hpp>
 #include <piecework/mesh/avatar.hpp>
 #include <piecework/runner/scene_values.hpp>
@@ -133,12 +133,15 @@ Body body_of(const scene::Collider& collider, const scene::Scene& scene,
 
 }  // namespace
 
-void add_colliders(World& world) {
+int add_colliders(World& world) {
   const Positions& cloth = world.model.start;
   const double extent = (cloth.colwise().maxCoeff() - cloth.colwise().minCoeff()).maxCoeff();
   const colliders::AuditOptions options{.h = world.scene.step.h, .steps = world.scene.step.steps};
+  int inside_solids = 0;
   const auto note = [&](const auto& collider) {
     const colliders::Audit audit = colliders::audit(collider, cloth, options);
+    if (std::is_same_v<std::decay_t<decltype(collider)>, colliders::AnalyticCollider>)
+      inside_solids += static_cast<int>(audit.inside.size());
     for (const std::string& line : colliders::notes(audit, collider.traits(), extent))
       world.notes.push_back(line);
   };
@@ -159,30 +162,7 @@ void add_colliders(World& world) {
                                       placement, motion_of(collider), std::move(body.deformation));
     note(world.mesh_colliders.back());
   }
-}
-
-void note_start_intersections(World& world) {
-  if (!world.scene.self_collision && world.mesh_colliders.empty()) return;
-  Triangles obstacles;
-  Positions all = world.model.start, one;
-  for (const colliders::MeshCollider& collider : world.mesh_colliders) {
-    collider.positions_at(0, one);
-    const int first = static_cast<int>(all.rows()) - world.model.num_vertices();
-    for (const Triangle& t : collider.triangles())
-      obstacles.push_back({first + t[0], first + t[1], first + t[2]});
-    all.conservativeResize(all.rows() + one.rows(), Eigen::NoChange);
-    all.bottomRows(one.rows()) = one;
-  }
-  const int num_obstacle_vertices = static_cast<int>(all.rows()) - world.model.num_vertices();
-  const collision::Surface surface =
-      collision::make_surface(world.model.triangles, world.model.num_vertices(), obstacles,
-                              num_obstacle_vertices, world.scene.self_collision);
-  const auto count = collision::find_intersections(surface, all).size();
-  if (count > 0)
-    world.notes.push_back(fmt::format(
-        "{} edges pass through triangles at the start; they stay so, since nothing passes through "
-        "anything: move cloths or colliders apart",
-        count));
+  return inside_solids;
 }
 
 }  // namespace piecework::runner

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <piecework/runner/methods.hpp>
+#include <piecework/runner/start.hpp>
 #include <piecework/runner/world.hpp>
 #include <piecework/scene/scene_io.hpp>
 
@@ -39,7 +40,7 @@ std::vector<scene::Override> coarse(const Beginning& beginning) {
 int touching_pairs(const scene::Scene& scene, int steps) {
   const auto world = build_world(scene);
   const auto integrator = make_integrator(*world);
-  model::State state = integrator->initial_state(world->part_velocity);
+  model::State state = start_state(*world, *integrator);
   int pairs = 0;
   for (int step = 1; step <= steps; ++step) {
     const model::StepReport report = integrator->step(state);

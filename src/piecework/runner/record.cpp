@@ -133,6 +133,14 @@ Json scene_json(const RunRecord& record, const World& world) {
                {"domains", domains_json(world)}};
   if (!world.model.sewing.empty())  // what is off has no key
     json["sewn_vertices"] = world.model.sewing.map().num_slaves();
+  if (world.untangling) {
+    const untangle::UntangleReport& r = *world.untangling;
+    json["untangling"] = {
+        {"edges_through_triangles", {{"before", r.before.edges}, {"after", r.after.edges}}},
+        {"vertices_inside", {{"before", r.before.inside}, {"after", r.after.inside}}},
+        {"rounds", r.rounds},
+        {"largest_move_m", r.largest_move}};
+  }
   json["resolved"] = Json::parse(scene::resolved_json(world.scene));
   return json;
 }

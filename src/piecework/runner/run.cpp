@@ -19,6 +19,7 @@
 #include <piecework/runner/expectation.hpp>
 #include <piecework/runner/iteration_log.hpp>
 #include <piecework/runner/methods.hpp>
+#include <piecework/runner/start.hpp>
 #include <piecework/scene/scene_io.hpp>
 
 namespace piecework::runner {
@@ -162,7 +163,7 @@ class Run {
 
   void load_or_start() {
     const fs::path checkpoint = options_.directory / kCheckpoint;
-    state_ = integrator_->initial_state(world_->part_velocity);
+    state_ = start_state(*world_, *integrator_);
     if (!fs::exists(checkpoint)) {
       if (options_.resume)
         world_->notes.push_back("no checkpoint to resume from: started at frame 0");

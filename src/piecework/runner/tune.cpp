@@ -12,6 +12,7 @@
 #include <piecework/model/assembly.hpp>
 #include <piecework/model/reduction.hpp>
 #include <piecework/runner/methods.hpp>
+#include <piecework/runner/start.hpp>
 
 namespace piecework::runner {
 namespace {
@@ -54,7 +55,7 @@ FirstSolve first_solve(const World& world) {
   model::Integrator integrator(world.model, world.forces, world.pins,
                                {.h = world.scene.step.h, .damping = world.scene.damping},
                                std::make_unique<Capture>(world, system));
-  model::State state = integrator.initial_state(world.part_velocity);
+  model::State state = start_state(world, integrator);
   integrator.step(state);
   if (system.vertices.empty())
     throw InputError(

@@ -13,6 +13,7 @@
 #include <piecework/runner/bodies.hpp>
 #include <piecework/runner/scene_values.hpp>
 #include <piecework/runner/sewing.hpp>
+#include <piecework/runner/start.hpp>
 
 namespace piecework::runner {
 namespace {
@@ -227,8 +228,7 @@ std::unique_ptr<World> build_world(const scene::Scene& scene) {
   for (std::size_t i = 0; i < scene.cloths.size(); ++i)
     add_pins_and_loads(*world, i, fmt::format("{}: /cloths/{}", scene.source, i));
   hold_seams(*world);
-  add_colliders(*world);
-  note_start_intersections(*world);
+  prepare_start(*world, add_colliders(*world));
   world->load_ms = watch.lap();
 
   world->domains = decomposition::decompose(

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include <piecework/model/forces.hpp>
 #include <piecework/model/pins.hpp>
 #include <piecework/scene/scene.hpp>
+#include <piecework/untangle/untangle.hpp>
 
 namespace piecework::runner {
 
@@ -28,6 +30,8 @@ struct World {
   std::vector<Vec3> part_velocity;                              ///< m/s, per cloth
   std::vector<colliders::AnalyticCollider> analytic_colliders;  ///< in the order of the scene
   std::vector<colliders::MeshCollider> mesh_colliders;          ///< in the order of the scene
+  Positions untangled;  ///< where cloth starts if its start shape intersected, |V| x 3, m; or empty
+  std::optional<untangle::UntangleReport> untangling;  ///< absent: nothing was to be done
   decomposition::Decomposition domains;
   decomposition::Summary domain_summary;
   std::vector<std::string> notes;  ///< repairs, colliders, reduced domain counts

@@ -157,6 +157,7 @@ struct Contact {
   std::string barrier = "two_stage";
   double slip_speed = 1e-3;  ///< m/s
   bool check = true;
+  int untangle = 100;  ///< rounds at most; 0: off
 
   bool operator==(const Contact&) const = default;
 };

@@ -463,6 +463,10 @@ void fields(V& v, Contact& c) {
        "count edges that pass through triangles after every step, by a test that shares nothing "
        "with what prevents them"},
       c.check);
+  v.value({"untangle",
+           "a start that intersects is taken apart before the first step, in so many rounds at "
+           "most; 0: off"},
+          c.untangle, between(0, 100000));
 }
 
 template <class V>
