@@ -105,6 +105,10 @@ void HessianMatrix::soften(const Positions& x, const StepProblem& problem, Hessi
 
 void HessianMatrix::assemble(const Positions& x, const StepProblem& problem, HessianForm form) {
   soften(x, problem, form);
+  complete();
+}
+
+void HessianMatrix::complete() {
   blocks_.resize(static_cast<std::size_t>(system_.nonZeros()));
   parallel_for(blocks_.size(), [&](std::size_t k) { blocks_[k] = gathered(k); });
 }

@@ -33,6 +33,9 @@ class HessianMatrix {
   /// read.
   void assemble_rounded(const Positions& x, const StepProblem& problem, HessianForm form);
 
+  /// After assemble_rounded(): what assemble() would have made.
+  void complete();
+
   /// Number of block rows, n_f.
   [[nodiscard]] int count() const { return static_cast<int>(system_.cols()); }
   /// K~: its pattern is the pattern of the blocks, both triangles stored.

@@ -14,6 +14,9 @@ constexpr double kLoosest = 0.5, kTightest = 0.1;
 /// ... and if the increment is small. Under stiff contact the residual is all pressing: with a
 /// tenth of it left, cloth has hardly begun to slide, and would be taken for converged.
 constexpr double kSmall = 0.03;
+/// Iterations in the metric, in prices of a factor of H, until that is worth it. More than one, as
+/// each direction in the rest of the step needs a factor of its own.
+constexpr double kPrices = 6;
 
 double longest(const Positions& d) {
   return std::sqrt(parallel_max(static_cast<std::size_t>(d.rows()), [&](std::size_t i) {
@@ -60,11 +63,23 @@ void add_onto(Positions& a, double factor, const Positions& b) {
 
 }  // namespace
 
+void InexactNewton::reset() {
+  reduction_ = nullptr;
+  if (factor_) factor_->reset();
+}
+
+void InexactNewton::begin() {
+  last_norm_sq_ = 0;
+  factored_ = false;
+  factors_ = true;
+}
+
 void InexactNewton::assemble(const Positions& x, const model::StepProblem& problem,
                              const Metric& metric, const model::ContactTerms* contact) {
   if (!reduction_) {
     reduction_ = &metric.reduction();
     hessian_.set_pattern(*reduction_, reduction_->system(metric.K()));
+    price_ = kPrices * HessianFactor::price(metric.solver().report(), hessian_);
   }
   hessian_.assemble_rounded(x, problem, model::HessianForm::Projected);
   blocks_.clear();
@@ -86,27 +101,46 @@ double InexactNewton::forcing(double norm_sq) {
   return std::clamp(0.9 * ratio_sq, kTightest, kLoosest);
 }
 
+bool InexactNewton::factor() {
+  if (!factor_) factor_ = std::make_unique<HessianFactor>();
+  factored_ = factors_ = factor_->factor(hessian_, blocks_, model_, *reduction_);
+  return factored_;
+}
+
+void InexactNewton::precondition(Metric& metric) {
+  if (factored_)
+    factor_->apply(residual_, preconditioned_);
+  else
+    metric.apply(residual_, preconditioned_);
+}
+
 int InexactNewton::solve(const Positions& g, double small, Metric& metric, Positions& d) {
+  if (factored_) factor();
   d.setZero(g.rows(), 3);
   residual_ = -g;
-  metric.apply(residual_, preconditioned_);
-  direction_ = preconditioned_;
-  double norm_sq = dot(residual_, preconditioned_);
-  const double tight = kSmall * kSmall * norm_sq;
-  double enough = std::pow(forcing(norm_sq), 2) * norm_sq;
+  double norm_sq = 0, tight = 0, enough = 0;
+  const auto begin = [&] {
+    precondition(metric);
+    direction_ = preconditioned_;
+    norm_sq = dot(residual_, preconditioned_);
+    tight = kSmall * kSmall * norm_sq;
+    enough = std::pow(forcing(norm_sq), 2) * norm_sq;
+  };
+  begin();
   int iterations = 0;
   while (iterations < kMaxIterations && norm_sq > tight) {
     if (norm_sq <= enough) {
       if (longest(d) > small) break;
       enough = tight;
     }
+    if (!factored_ && factors_ && iterations >= price_ && factor()) begin();
     multiply(direction_, product_);
     const double curvature = dot(direction_, product_);
     if (!(curvature > 0)) break;  // only rounding is left
     const double step = norm_sq / curvature;
     advance(step, direction_, product_, d, residual_);
     ++iterations;
-    metric.apply(residual_, preconditioned_);
+    precondition(metric);
     const double next_sq = dot(residual_, preconditioned_);
     add_onto(direction_, next_sq / norm_sq, preconditioned_);
     norm_sq = next_sq;
