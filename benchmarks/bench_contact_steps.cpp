@@ -253,7 +253,7 @@ void detection(benchmark::State& state) {
   const Simulation simulation(drape_scene(side_of(state.range(0)), "1e-2"));
   Records records;
   for (auto _ : state) {
-    records = ThreadPool(1).run([&] {
+    records = ThreadPool(std::min(2, available_threads())).run([&] {
       model::State motion = simulation.start();
       Records all;
       for (int k = 0; k < (quick() ? 6 : 10); ++k)
