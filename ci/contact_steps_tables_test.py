@@ -1,15 +1,11 @@
 #!/usr/bin/env python3
 """Tests of ci/contact_steps_tables on a small raw JSON written by hand."""
-import json
 import re
-import subprocess
-import sys
-import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 
-SCRIPT = Path(__file__).resolve().parent / "contact_steps_tables"
+from tables_test_case import TablesTestCase
+
 CONTEXT = {"date": "2026-01-02T03:04:05+00:00", "num_cpus": 2, "cpu_model": "Abacus",
            "build_type": "Release", "revision": "cafe", "dirty": "false"}
 
@@ -69,16 +65,10 @@ TRACES = {"columns": COLUMNS, "runs": [run("ball", "1e-1", 1), run("ball", "1e-2
                                        run("ball", "1e-2", 2), run("pile", "0.01", 1)]}
 
 
-class ContactStepsTables(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.out = Path(folder.name)
-        (self.out / "raw.json").write_text(json.dumps(RAW))
-        (self.out / "traces.json").write_text(json.dumps(TRACES))
-        subprocess.run([sys.executable, SCRIPT, self.out / "raw.json", "--out", self.out,
-                        "--traces", self.out / "traces.json"], check=True)
-        self.text = (self.out / "contact_steps.md").read_text()
+class ContactStepsTables(TablesTestCase):
+    name = "contact_steps"
+    raw = RAW
+    traces = TRACES
 
     def line(self, start):
         lines = [line for line in self.text.splitlines() if line.startswith("| " + start)]

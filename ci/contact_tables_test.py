@@ -1,14 +1,10 @@
 #!/usr/bin/env python3
 """Tests of ci/contact_tables on a small raw JSON written by hand."""
-import json
-import subprocess
-import sys
-import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 
-SCRIPT = Path(__file__).resolve().parent / "contact_tables"
+from tables_test_case import TablesTestCase
+
 CONTEXT = {"date": "2026-01-02T03:04:05+00:00", "num_cpus": 2, "cpu_model": "Abacus",
            "build_type": "Release", "revision": "cafe", "dirty": "false"}
 
@@ -42,16 +38,10 @@ TRACES = {"columns": ["iteration", "ms", "residual", "true_error"],
                      for n in (3721, 60025) for solver in ("kinv_pcg", "refactor", "dual")]}
 
 
-class ContactTables(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.out = Path(folder.name)
-        (self.out / "raw.json").write_text(json.dumps(RAW))
-        (self.out / "traces.json").write_text(json.dumps(TRACES))
-        subprocess.run([sys.executable, SCRIPT, self.out / "raw.json", "--out", self.out,
-                        "--traces", self.out / "traces.json"], check=True)
-        self.text = (self.out / "contact.md").read_text()
+class ContactTables(TablesTestCase):
+    name = "contact"
+    raw = RAW
+    traces = TRACES
 
     def lines(self, start):
         return [[c.strip() for c in line.split("|")[1:-1]] for line in self.text.splitlines()

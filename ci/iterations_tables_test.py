@@ -1,14 +1,10 @@
 #!/usr/bin/env python3
 """Tests of ci/iterations_tables on a small raw JSON written by hand."""
-import json
-import subprocess
-import sys
-import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 
-SCRIPT = Path(__file__).resolve().parent / "iterations_tables"
+from tables_test_case import TablesTestCase
+
 CONTEXT = {"date": "2026-01-02T03:04:05+00:00", "num_cpus": 2, "cpu_model": "Abacus",
            "build_type": "Release", "revision": "cafe", "dirty": "false"}
 LEVELS = ("1e-1", "1e-2", "1e-3", "1e-4", "1e-5", "1e-6")
@@ -47,16 +43,10 @@ TRACES = {"columns": ["iteration", "ms", "energy_error", "position_error", "grad
                       "points": [[1, 1, 0.5, 1, 1, 1], [100, 9, 1e-4, 1, 1, 1]]}]}
 
 
-class IterationsTables(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.out = Path(folder.name)
-        (self.out / "raw.json").write_text(json.dumps(RAW))
-        (self.out / "traces.json").write_text(json.dumps(TRACES))
-        subprocess.run([sys.executable, SCRIPT, self.out / "raw.json", "--out", self.out,
-                        "--traces", self.out / "traces.json"], check=True)
-        self.text = (self.out / "iterations.md").read_text()
+class IterationsTables(TablesTestCase):
+    name = "iterations"
+    raw = RAW
+    traces = TRACES
 
     def test_sweeps_are_judged_by_the_target(self):
         self.assertIn("gauss_seidel / jacobi. Iterations 1e-1: 1, 1e-2: 0.500, 1e-3: 0.500, "

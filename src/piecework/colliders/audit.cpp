@@ -35,14 +35,6 @@ int count_duplicates(Triangles triangles) {
   return static_cast<int>(triangles.end() - std::unique(triangles.begin(), triangles.end()));
 }
 
-double signed_volume(const Triangles& triangles, const Positions& x) {
-  const Eigen::RowVector3d origin = x.colwise().mean();
-  double sum = 0;
-  for (const Triangle& t : triangles)
-    sum += (x.row(t[0]) - origin).dot((x.row(t[1]) - origin).cross(x.row(t[2]) - origin));
-  return sum / 6;
-}
-
 /// Numbers of the steps to look at.
 std::vector<int> audited_steps(int steps) {
   std::vector<int> chosen;
@@ -180,6 +172,14 @@ std::string size_text(const Audit& audit) {
 }
 
 }  // namespace
+
+double signed_volume(const Triangles& triangles, const Positions& x) {
+  const Eigen::RowVector3d origin = x.colwise().mean();
+  double sum = 0;
+  for (const Triangle& t : triangles)
+    sum += (x.row(t[0]) - origin).dot((x.row(t[1]) - origin).cross(x.row(t[2]) - origin));
+  return sum / 6;
+}
 
 std::vector<int> points_inside(const Triangles& triangles, const Positions& x,
                                const Positions& points) {

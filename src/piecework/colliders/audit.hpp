@@ -37,6 +37,9 @@ Audit audit(const AnalyticCollider& collider, const Positions& cloth, const Audi
 /// Inside of a closed mesh is where its winding number is not 0; of an open one nothing is.
 Audit audit(const MeshCollider& collider, const Positions& cloth, const AuditOptions& options);
 
+/// Volume that triangles enclose, m^3: negative if they face inward. \pre closed
+double signed_volume(const Triangles& triangles, const Positions& x);
+
 /// Which of the points (|P| x 3, m) lie inside of a closed mesh, whatever its orientation: by the
 /// signed crossings of rays along +x, decided edge by edge so that no ray slips through an edge.
 std::vector<int> points_inside(const Triangles& triangles, const Positions& x,

@@ -46,8 +46,10 @@ void Bodies::begin_step(double begin, double end) {
 
 void Bodies::place(double part) {
   part_ = part;
-  pose(begin_time_ + part * (end_time_ - begin_time_), now_);
-  if (part == 1) now_ = end_;
+  if (part == 1)
+    now_ = end_;
+  else
+    pose(begin_time_ + part * (end_time_ - begin_time_), now_);
 }
 
 void Bodies::take_back() {
@@ -55,15 +57,19 @@ void Bodies::take_back() {
   std::swap(now_, before_);
 }
 
+bool Bodies::is_inside(int body, const std::vector<Eigen::Isometry3d>& poses, const Positions& x,
+                       std::size_t v) const {
+  const Vec3 p = x.row(static_cast<Eigen::Index>(v)).transpose();
+  return colliders_[at(body)].signed_distance(p, poses[at(body)]).distance < 0;
+}
+
 bool Bodies::any_enters(const Positions& from, const std::vector<char>& held,
                         const Positions& x) const {
   for (int body = 0; body < static_cast<int>(colliders_.size()); ++body) {
     const double enter = parallel_max(at(static_cast<int>(x.rows())), [&](std::size_t v) {
-      const auto inside = [&](const Positions& at_v, const Eigen::Isometry3d& pose) {
-        const Vec3 p = at_v.row(static_cast<Eigen::Index>(v)).transpose();
-        return colliders_[at(body)].signed_distance(p, pose).distance < 0;
-      };
-      return !held[v] && inside(x, now_[at(body)]) && !inside(from, before_[at(body)]) ? 1.0 : 0.0;
+      const bool enters =
+          !held[v] && is_inside(body, now_, x, v) && !is_inside(body, before_, from, v);
+      return enters ? 1.0 : 0.0;
     });
     if (enter > 0) return true;
   }
@@ -164,9 +170,7 @@ int Bodies::count_inside(const Positions& x) const {
   double count = 0;
   for (int body = 0; body < static_cast<int>(colliders_.size()); ++body)
     count += parallel_sum<double>(at(static_cast<int>(x.rows())), [&](std::size_t v) {
-      const Vec3 p = x.row(static_cast<Eigen::Index>(v)).transpose();
-      const double d = colliders_[at(body)].signed_distance(p, end_[at(body)]).distance;
-      return d < 0 ? 1.0 : 0.0;
+      return is_inside(body, end_, x, v) ? 1.0 : 0.0;
     });
   return static_cast<int>(count);
 }

@@ -73,6 +73,8 @@ class Bodies {
   [[nodiscard]] double distance(int body) const;
   [[nodiscard]] Vec3 beside(int body, const Vec3& from, const Vec3& way, double part) const;
   void pose(double time, std::vector<Eigen::Isometry3d>& poses) const;
+  [[nodiscard]] bool is_inside(int body, const std::vector<Eigen::Isometry3d>& poses,
+                               const Positions& x, std::size_t v) const;
   [[nodiscard]] double free_part(int body, const Vec3& from, const Vec3& way,
                                  const Eigen::Isometry3d& pose) const;
 

@@ -64,6 +64,11 @@ const colliders::MeshCollider& Obstacles::of_vertex(int v) const {
   return meshes_[static_cast<std::size_t>(next - first_vertex_.begin()) - 1];
 }
 
+collision::Surface Obstacles::surface(const model::ClothModel& cloth, bool self) const {
+  return collision::make_surface(cloth.triangles, cloth.num_vertices(), triangles_, num_vertices(),
+                                 self);
+}
+
 double Obstacles::distance(double otherwise) const {
   double largest = 0;
   for (const auto& mesh : meshes_)
@@ -414,8 +419,8 @@ void Contact::end_step(const Positions& x) {
   const Stopwatch watch;
   report_.interpenetrations = bodies_.count_inside(x);
   if (may_pair(options_, obstacles_)) {
-    Positions all(x.rows() + obstacle_now_.rows(), 3);
-    all << x, obstacle_now_;
+    Positions all;
+    Points{x, obstacle_now_}.copy_to(all);
     report_.interpenetrations +=
         static_cast<int>(collision::find_intersections(near_.surface(), all).size());
   }

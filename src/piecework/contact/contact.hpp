@@ -51,6 +51,8 @@ class Obstacles {
   [[nodiscard]] bool are_static() const;
   /// Positions at a time (s), num_vertices() x 3, m.
   void place(double time, Positions& x) const;
+  /// Of cloth and these meshes. \param self  cloth touches cloth
+  [[nodiscard]] collision::Surface surface(const model::ClothModel& cloth, bool self) const;
   /// The mesh that a vertex belongs to.
   [[nodiscard]] const colliders::MeshCollider& of_vertex(int v) const;
   /// The largest contact distance of any, m; 0 without any. \param otherwise  of those without

@@ -29,14 +29,14 @@ double box_distance(collision::PairKind kind, const collision::PairPoints& x) {
   return std::sqrt(gap.squaredNorm());
 }
 
-void take(const Points& x, Positions& out) {
-  out.resize(x.count(), 3);
-  parallel_for(at(x.count()), [&](std::size_t v) {
-    out.row(static_cast<Eigen::Index>(v)) = x(static_cast<int>(v)).transpose();
+}  // namespace
+
+void Points::copy_to(Positions& out) const {
+  out.resize(count(), 3);
+  parallel_for(at(count()), [&](std::size_t v) {
+    out.row(static_cast<Eigen::Index>(v)) = (*this)(static_cast<int>(v)).transpose();
   });
 }
-
-}  // namespace
 
 NearPairs::NearPairs(collision::Surface surface, double reach, double slack)
     : broad_phase_(std::move(surface)), reach_(reach), slack_(slack) {}
@@ -99,7 +99,7 @@ void NearPairs::list_candidates(const Points& x) {
                   : NearPair{edge_edge(found.edge_edge[i - vt]), EdgeEdge, 0};
     pair.distance = box_distance(pair.kind, x(pair.vertices));
   });
-  take(x, candidates_.made_at);
+  x.copy_to(candidates_.made_at);
 }
 
 bool NearPairs::valid_at(const Points& x) const {
@@ -134,7 +134,7 @@ const PairList& NearPairs::near(const Points& x) {
   near_.pairs.clear();
   for (const auto& block : blocks_)
     near_.pairs.insert(near_.pairs.end(), block.begin(), block.end());
-  take(x, near_.made_at);
+  x.copy_to(near_.made_at);
   return near_;
 }
 

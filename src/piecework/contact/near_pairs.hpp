@@ -29,6 +29,8 @@ struct Points {
     return {(*this)(v[0]), (*this)(v[1]), (*this)(v[2]), (*this)(v[3])};
   }
   [[nodiscard]] int count() const { return static_cast<int>(cloth.rows() + obstacles.rows()); }
+  /// All of them, count() x 3, m.
+  void copy_to(Positions& out) const;
 };
 
 /// A vector that starts as zero, for sums.

@@ -17,12 +17,11 @@ std::size_t count_crossings(const World& world, const Positions& x) {
   const contact::Obstacles obstacles(world.mesh_colliders);
   Positions placed;
   obstacles.place(0, placed);
-  Positions all(x.rows() + placed.rows(), 3);
-  all << x, placed;
-  const collision::Surface surface = collision::make_surface(
-      world.model.triangles, world.model.num_vertices(), obstacles.triangles(),
-      obstacles.num_vertices(), world.scene.self_collision);
-  return collision::find_intersections(surface, all).size();
+  Positions all;
+  contact::Points{x, placed}.copy_to(all);
+  return collision::find_intersections(obstacles.surface(world.model, world.scene.self_collision),
+                                       all)
+      .size();
 }
 
 std::string text_of(const untangle::Count& count) {
@@ -56,8 +55,8 @@ void prepare_start(World& world, int inside_solids) {
   if (world.scene.contact.untangle == 0) {
     world.notes.push_back(fmt::format(
         "start: {} edges pass through triangles and {} vertices are inside of bodies; no step "
-        "takes "
-        "edges out of triangles: move cloths or colliders apart, or switch /contact/untangle on",
+        "takes edges out of triangles: move cloths or colliders apart, or switch /contact/untangle "
+        "on",
         crossings, inside_solids));
     return;
   }

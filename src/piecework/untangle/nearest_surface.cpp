@@ -18,11 +18,6 @@ Vec3 center(const Triangle& t, const Positions& x) {
   return (corner(t, x, 0) + corner(t, x, 1) + corner(t, x, 2)) / 3;
 }
 
-Vec3 normal_of(const Triangle& t, const Positions& x) {
-  const Vec3 a = corner(t, x, 0);
-  return (corner(t, x, 1) - a).cross(corner(t, x, 2) - a).stableNormalized();
-}
-
 /// Per triangle whether a point just above its middle is inside; `side` -1: just below.
 std::vector<char> inside_beside(const Triangles& triangles, const Positions& x, double side) {
   constexpr double kOfSize = 1e-4;  // of a triangle: far above rounding, far below its neighbours
@@ -31,7 +26,7 @@ std::vector<char> inside_beside(const Triangles& triangles, const Positions& x, 
     const Vec3 middle = center(triangles[t], x);
     const double size = (corner(triangles[t], x, 0) - middle).norm();
     points.row(static_cast<Eigen::Index>(t)) =
-        middle + side * kOfSize * size * normal_of(triangles[t], x);
+        middle + side * kOfSize * size * area_normal(triangles[t], x).stableNormalized();
   }
   std::vector<char> inside(triangles.size(), 0);
   for (const int t : colliders::points_inside(triangles, x, points))
@@ -111,7 +106,7 @@ NearestSurface::Foot NearestSurface::nearest(const Vec3& p) const {
       where = t;
     }
   }
-  return {p - offset, normal_of(triangles_[where], x_)};
+  return {p - offset, area_normal(triangles_[where], x_).stableNormalized()};
 }
 
 }  // namespace piecework::untangle

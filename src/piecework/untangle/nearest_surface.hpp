@@ -9,6 +9,12 @@
 
 namespace piecework::untangle {
 
+/// Normal of a triangle, twice its area long, m^2.
+inline Vec3 area_normal(const Triangle& t, const Positions& x) {
+  const Vec3 a = x.row(t[0]), b = x.row(t[1]), c = x.row(t[2]);
+  return (b - a).cross(c - a);
+}
+
 /// The triangles of a closed mesh between its inside and its outside, for queries of the nearest
 /// point: where pieces of the mesh overlap, what lies in another piece is no way out. A binary tree
 /// of boxes, halved by the number of triangles.

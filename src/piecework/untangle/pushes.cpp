@@ -21,11 +21,6 @@ using EdgeVertices = std::array<int, 2>;
 
 Vec3 unit(const Vec3& v) { return v.stableNormalized(); }  // zero stays zero
 
-Vec3 area_normal(const Triangle& t, const Positions& x) {
-  const Vec3 a = x.row(t[0]), b = x.row(t[1]), c = x.row(t[2]);
-  return (b - a).cross(c - a);
-}
-
 /// Where an edge passes through a triangle.
 struct Crossing {
   EdgeVertices edge;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <piecework/colliders/audit.hpp>
+
 #include "groups.hpp"
 
 namespace piecework::untangle {
@@ -20,15 +22,6 @@ std::vector<int> pieces(const model::ClothModel& model, const collision::Surface
   return groups.all();
 }
 
-/// The sign of the volume.
-double orientation(const Triangles& triangles, const Positions& x) {
-  const Eigen::RowVector3d origin = x.colwise().mean();
-  double volume = 0;
-  for (const Triangle& t : triangles)
-    volume += (x.row(t[0]) - origin).dot((x.row(t[1]) - origin).cross(x.row(t[2]) - origin));
-  return volume < 0 ? -1 : 1;
-}
-
 std::vector<ClosedMesh> closed_meshes(const contact::Colliders& colliders, int num_cloth,
                                       double distance) {
   std::vector<ClosedMesh> closed;
@@ -40,7 +33,8 @@ std::vector<ClosedMesh> closed_meshes(const contact::Colliders& colliders, int n
       NearestSurface way_out(mesh.triangles(), x);
       if (!way_out.empty())
         closed.push_back({mesh.triangles(), x, first, mesh.traits().thickness.value_or(distance),
-                          orientation(mesh.triangles(), x), std::move(way_out)});
+                          colliders::signed_volume(mesh.triangles(), x) < 0 ? -1.0 : 1.0,
+                          std::move(way_out)});
     }
     first += mesh.num_vertices();
   }
@@ -55,8 +49,7 @@ Setting::Setting(const model::ClothModel& cloth, const contact::Colliders& colli
       held(held_vertices),
       distance(options.distance),
       obstacles(colliders.meshes),
-      surface(collision::make_surface(cloth.triangles, cloth.num_vertices(), obstacles.triangles(),
-                                      obstacles.num_vertices(), options.self)),
+      surface(obstacles.surface(cloth, options.self)),
       triangles_at(mesh::vertex_triangles(surface.triangles, surface.num_vertices)),
       piece(pieces(cloth, surface)),
       closed(closed_meshes(colliders, cloth.num_vertices(), options.distance)),

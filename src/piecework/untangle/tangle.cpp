@@ -65,8 +65,8 @@ bool are_joined(const Setting& setting, const collision::PairVertices& v, std::s
 }  // namespace
 
 Positions all_positions(const Setting& setting, const Positions& x) {
-  Positions all(x.rows() + setting.obstacle_x.rows(), 3);
-  all << x, setting.obstacle_x;
+  Positions all;
+  contact::Points{x, setting.obstacle_x}.copy_to(all);
   return all;
 }
 
