@@ -31,7 +31,7 @@ frames = [dict(steps=1, step_ms=4.0, counters=counters), dict(steps=2, step_ms=1
           counters=dict(counters, interpenetrations=0))]
 record = dict(environment=dict(cpu="Abacus", revision="cafe"), frames=frames, scene=dict(
     vertices=9, resolved={SCENE!r}, settings=sys.argv[5:]))
-directory.mkdir(parents=True)
+directory.mkdir(parents=True, exist_ok=True)
 (directory / "run.json").write_text(json.dumps(record))
 if name == "crash" and number == 1:
     sys.exit("piecework: step 3: not finite")
@@ -106,6 +106,20 @@ class Runs(unittest.TestCase):
         self.assertIn("1 run did not end: **not reached**", text)
         self.assertIn("- crash, run 1: piecework: step 3: not finite", text)
         self.assertIn("- lost was left out: piecework: scenes/lost.json: file not found", text)
+
+    def test_runs_that_ended_are_kept_until_something_changes(self):
+        self.run_script("--runs", "2", "leak", "crash")
+        record = self.folder / "work/leak/02/run.json"
+        def fresh(*arguments):
+            record.write_text(record.read_text().replace("Abacus", "kept"))
+            status, text = self.run_script(*arguments, "leak", "crash")
+            self.assertIn("crash, run 1: piecework: step 3: not finite", text)
+            self.assertEqual(status, 1)
+            return "kept" not in record.read_text()
+        self.assertFalse(fresh("--runs", "3"))
+        self.assertTrue(fresh("--runs", "3", "--coarse"))
+        self.program.write_text(PROGRAM + "# another version")
+        self.assertTrue(fresh("--runs", "3", "--coarse"))
 
     def test_settings_of_a_scene_reach_that_scene_only(self):
         self.run_script("--runs", "1", "--set", "pile:cloths.2.mesh.file=other.obj", "pile", "leak")
