@@ -74,15 +74,19 @@ struct DenseKernels {
   /// Cholesky factorisation of columns first ... last - 1 of a matrix of which the lower triangle
   /// is given and the columns before are done: L in those columns, and columns last ... end - 1
   /// less what L takes from them. Entries above the diagonal are void afterwards. False if a pivot
-  /// is not positive or not finite. `work`: 8 * rows numbers.
-  bool (*eliminate)(T* a, int rows, int ld, int first, int last, int end, T* work);
-  /// X = X L^-1; X: rows (a multiple of the chunk) x width, L lower triangular.
-  void (*solve_right)(const T* l, int ldl, int width, T* x, int ldx, int rows);
+  /// is not positive or not finite.
+  bool (*eliminate)(T* a, int rows, int ld, int first, int last, int end);
+  /// X = L^-1 of lower triangular L (width x width); X: whole chunks of rows are written, zero
+  /// above the diagonal.
+  void (*invert)(const T* l, int ldl, int width, T* x, int ldx);
+  /// -A X for lower triangular X (width x width, zero above the diagonal); A: rows x width. `out`
+  /// has the layout of a panel's block for numbers of this type.
+  void (*multiply)(const T* a, int lda, int rows, const T* x, int ldx, int width, T* out);
   /// Z = Y^T Y in full for lower triangular Y (width x width, zero above the diagonal; whole chunks
   /// of rows are read and written). `work`: ldy * width numbers.
   void (*square)(const T* y, int ldy, int width, T* z, int ldz, T* work);
-  /// The lower triangle of B (size x size) is added to A where the runs put its rows and columns.
-  void (*extend_add)(T* a, int lda, const T* b, int size, const RowRun* runs, int num_runs);
+  /// The lower triangle of B is added to A where the runs put its rows and columns.
+  void (*extend_add)(T* a, int lda, const T* b, int ldb, const RowRun* runs, int num_runs);
 };
 
 /// How panels are stored for an instruction set.

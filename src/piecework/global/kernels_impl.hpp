@@ -243,11 +243,9 @@ struct Dense {
     return true;
   }
 
-  /// Rows r ... r + count - 1 of the columns below a factored block: X = X L^-T, and their
-  /// transpose to `transposed` (K numbers per row).
+  /// Rows r ... r + count - 1 of the columns below a factored block: X = X L^-T.
   template <int K>
-  static void solve_block(T* a, int ld, const T* inverse, int block_row, int r, int count,
-                          T* transposed) {
+  static void solve_block(T* a, int ld, const T* inverse, int block_row, int r, int count) {
     V x[K];
     unroll<K>([&](auto c) PIECEWORK_INLINE {
       x[c] = S::load_some(a + r + static_cast<long>(c) * ld, count);
@@ -261,34 +259,32 @@ struct Dense {
     unroll<K>([&](auto c) PIECEWORK_INLINE {
       S::store_some(a + r + static_cast<long>(c) * ld, x[c], count);
     });
-    for (int i = 0; i < count; ++i)
-      for (int c = 0; c < K; ++c) transposed[i * K + c] = a[r + i + static_cast<long>(c) * ld];
   }
 
   /// Columns first ... end - 1 less L L^T, from the chunk of each column's diagonal down. `l`: K
-  /// columns of L, `transposed`: their rows from `first` on.
+  /// columns of L.
   template <int K>
-  static void update(T* a, const T* l, int ld, int rows, int first, int end, const T* transposed) {
+  static void update(T* a, const T* l, int ld, int rows, int first, int end) {
     for (int r = first / kSize * kSize; r < rows; r += kSize) {
       V x[K];
       unroll<K>([&](auto k) PIECEWORK_INLINE {
         x[k] = S::negative(S::load(l + r + static_cast<long>(k) * ld));
       });
       const int last = r + kSize < end ? r + kSize : end;
-      const T* t = transposed;
       T* column = a + r + static_cast<long>(first) * ld;
       for (int c = first; c < last; ++c) {
         V sum = S::load(column);
-        unroll<K>([&](auto k) PIECEWORK_INLINE { sum = S::fma(x[k], S::repeat(t[k]), sum); });
+        unroll<K>([&](auto k) PIECEWORK_INLINE {
+          sum = S::fma(x[k], S::repeat(l[c + static_cast<long>(k) * ld]), sum);
+        });
         S::store(column, sum);
         column += ld;
-        t += K;
       }
     }
   }
 
   template <int K>
-  static bool eliminate_block(T* a, int rows, int ld, int c, int end, T* work) {
+  static bool eliminate_block(T* a, int rows, int ld, int c, int end) {
     T inverse[K];
     T* l = a + static_cast<long>(c) * ld;
     if (!factor_block(l + c, ld, K, inverse)) return false;
@@ -297,70 +293,109 @@ struct Dense {
     while (r < rows) {  // up to the next whole chunk, then chunk by chunk
       int stop = r / kSize * kSize + kSize;
       if (stop > rows) stop = rows;
-      solve_block<K>(l, ld, inverse, c, r, stop - r, work + static_cast<long>(r - below) * K);
+      solve_block<K>(l, ld, inverse, c, r, stop - r);
       r = stop;
     }
-    update<K>(a, l, ld, rows, below, end, work);
+    update<K>(a, l, ld, rows, below, end);
     return true;
   }
 
   template <int K>
-  static bool eliminate_last(int count, T* a, int rows, int ld, int c, int end, T* work) {
+  static bool eliminate_last(int count, T* a, int rows, int ld, int c, int end) {
     if constexpr (K == 0) {
       return true;
     } else {
-      if (count == K) return eliminate_block<K>(a, rows, ld, c, end, work);
-      return eliminate_last<K - 1>(count, a, rows, ld, c, end, work);
+      if (count == K) return eliminate_block<K>(a, rows, ld, c, end);
+      return eliminate_last<K - 1>(count, a, rows, ld, c, end);
     }
   }
 
-  static bool eliminate(T* a, int rows, int ld, int first, int last, int end, T* work) {
+  static bool eliminate(T* a, int rows, int ld, int first, int last, int end) {
     int c = first;
     for (; c + kBlock <= last; c += kBlock)
-      if (!eliminate_block<kBlock>(a, rows, ld, c, end, work)) return false;
-    return eliminate_last<kBlock - 1>(last - c, a, rows, ld, c, end, work);
+      if (!eliminate_block<kBlock>(a, rows, ld, c, end)) return false;
+    return eliminate_last<kBlock - 1>(last - c, a, rows, ld, c, end);
   }
 
-  /// Chunks of rows at once, so that each number of L is fetched once for all of them.
-  template <int kChunks>
-  static void solve_right_rows(const T* l, int ldl, int width, T* x, int ldx) {
-    for (int c = width - 1; c >= 0; --c) {
+  /// Rows of X = L^-1, which solves X L = I from its last column to its first; the rows before
+  /// `first_row` are zero from column first_row + kSize on.
+  static void invert_rows(const T* l, int ldl, int width, int first_row, T* x, int ldx) {
+    x += first_row;
+    const int end = first_row + kSize < width ? first_row + kSize : width;
+    for (int c = width - 1; c >= end; --c) S::store(x + static_cast<long>(c) * ldx, S::zero());
+    for (int c = end - 1; c >= 0; --c) {
       const T* column = l + static_cast<long>(c) * ldl;
-      V sum[kChunks];
-      V other[kChunks];
-      unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
-        sum[i] = S::load(x + i * kSize + static_cast<long>(c) * ldx);
-        other[i] = S::zero();
-      });
+      T unit[kSize] = {};
+      if (c >= first_row) unit[c - first_row] = T(1);
+      V sum = S::load(unit);
+      V other = S::zero();
       int k = c + 1;
-      for (; k + 1 < width; k += 2) {
-        const V factor = S::repeat(-column[k]);
-        const V factor2 = S::repeat(-column[k + 1]);
+      for (; k + 1 < end; k += 2) {
         const T* from = x + static_cast<long>(k) * ldx;
-        unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
-          sum[i] = S::fma(S::load(from + i * kSize), factor, sum[i]);
-          other[i] = S::fma(S::load(from + ldx + i * kSize), factor2, other[i]);
-        });
+        sum = S::fma(S::load(from), S::repeat(-column[k]), sum);
+        other = S::fma(S::load(from + ldx), S::repeat(-column[k + 1]), other);
       }
-      if (k < width) {
-        const V factor = S::repeat(-column[k]);
-        unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
-          sum[i] = S::fma(S::load(x + i * kSize + static_cast<long>(k) * ldx), factor, sum[i]);
-        });
-      }
-      const V scale = S::repeat(T(1) / column[c]);
-      unroll<kChunks>([&](auto i) PIECEWORK_INLINE {
-        S::store(x + i * kSize + static_cast<long>(c) * ldx,
-                 S::mul(S::add(sum[i], other[i]), scale));
-      });
+      if (k < end)
+        sum = S::fma(S::load(x + static_cast<long>(k) * ldx), S::repeat(-column[k]), sum);
+      S::store(x + static_cast<long>(c) * ldx,
+               S::mul(S::add(sum, other), S::repeat(T(1) / column[c])));
     }
   }
 
-  static void solve_right(const T* l, int ldl, int width, T* x, int ldx, int rows) {
+  static void invert(const T* l, int ldl, int width, T* x, int ldx) {
+    for (int r = 0; r < width; r += kSize) invert_rows(l, ldl, width, r, x, ldx);
+  }
+
+  /// K columns of -A X, from the first of the `depth` columns of A that they take part in.
+  template <int K>
+  static void multiply_strip(const T* a, int lda, int rows, const T* x, int ldx, int depth,
+                             T* out) {
     int r = 0;
-    for (; r + 4 * kSize <= rows; r += 4 * kSize) solve_right_rows<4>(l, ldl, width, x + r, ldx);
-    for (; r + 2 * kSize <= rows; r += 2 * kSize) solve_right_rows<2>(l, ldl, width, x + r, ldx);
-    if (r < rows) solve_right_rows<1>(l, ldl, width, x + r, ldx);
+    for (; r + kSize <= rows; r += kSize) {
+      V sum[K];
+      unroll<K>([&](auto c) PIECEWORK_INLINE { sum[c] = S::zero(); });
+      for (int k = 0; k < depth; ++k) {
+        const V column = S::load(a + r + static_cast<long>(k) * lda);
+        unroll<K>([&](auto c) PIECEWORK_INLINE {
+          sum[c] = S::fma(column, S::repeat(x[k + static_cast<long>(c) * ldx]), sum[c]);
+        });
+      }
+      unroll<K>([&](auto c) PIECEWORK_INLINE { S::store(out + c * kSize, S::negative(sum[c])); });
+      out += K * kSize;
+    }
+    const int rest = rows - r;
+    if (rest == 0) return;
+    V sum[K];
+    unroll<K>([&](auto c) PIECEWORK_INLINE { sum[c] = S::zero(); });
+    for (int k = 0; k < depth; ++k) {
+      const V column = S::load_some(a + r + static_cast<long>(k) * lda, rest);
+      unroll<K>([&](auto c) PIECEWORK_INLINE {
+        sum[c] = S::fma(column, S::repeat(x[k + static_cast<long>(c) * ldx]), sum[c]);
+      });
+    }
+    unroll<K>([&](auto c)
+                  PIECEWORK_INLINE { S::store_some(out + c * rest, S::negative(sum[c]), rest); });
+  }
+
+  template <int K>
+  static void multiply_last(int cols, const T* a, int lda, int rows, const T* x, int ldx, T* out) {
+    if constexpr (K > 0) {
+      if (cols == K)
+        multiply_strip<K>(a, lda, rows, x, ldx, K, out);
+      else
+        multiply_last<K - 1>(cols, a, lda, rows, x, ldx, out);
+    }
+  }
+
+  static void multiply(const T* a, int lda, int rows, const T* x, int ldx, int width, T* out) {
+    constexpr int kStrip = S::kStrip;
+    const long strip = Sweep<S, 1>::aligned(static_cast<long>(kStrip) * rows);
+    int c = 0;
+    for (; c + kStrip <= width; c += kStrip, out += strip)
+      multiply_strip<kStrip>(a + static_cast<long>(c) * lda, lda, rows,
+                             x + c + static_cast<long>(c) * ldx, ldx, width - c, out);
+    multiply_last<kStrip - 1>(width - c, a + static_cast<long>(c) * lda, lda, rows,
+                              x + c + static_cast<long>(c) * ldx, ldx, out);
   }
 
   /// Columns c ... c + K - 1 of Z: the rows of Y from c on, each times its numbers in them. Several
@@ -401,21 +436,27 @@ struct Dense {
                     count - i);
   }
 
-  static void extend_add(T* a, int lda, const T* b, int size, const RowRun* runs, int num_runs) {
-    for (int k = 0; k < num_runs; ++k)
-      for (int i = 0; i < runs[k].length; ++i) {
-        T* column = a + static_cast<long>(runs[k].start + i) * lda;
-        add(column + runs[k].start + i, b, runs[k].length - i);
-        const T* from = b + (runs[k].length - i);
-        for (int m = k + 1; m < num_runs; ++m) {
-          add(column + runs[m].start, from, runs[m].length);
-          from += runs[m].length;
-        }
-        b += size + 1;  // the next diagonal entry
+  /// Run after run of rows, each across all columns: were it column after column, the next run's
+  /// load would often have to wait for the store of the one before, to the same cache line.
+  static void extend_add(T* a, int lda, const T* b, int ldb, const RowRun* runs, int num_runs) {
+    long row = 0;  // of B: the run's first
+    for (int m = 0; m < num_runs; ++m) {
+      const RowRun rows = runs[m];
+      const T* from = b + row;
+      for (int k = 0; k < m; ++k) {
+        T* to = a + rows.start + static_cast<long>(runs[k].start) * lda;
+        for (int i = 0; i < runs[k].length; ++i, to += lda, from += ldb) add(to, from, rows.length);
       }
+      T* to = a + rows.start + static_cast<long>(rows.start) * lda;
+      for (int i = 0; i < rows.length; ++i, to += lda + 1, from += ldb + 1)
+        add(to, from, rows.length - i);
+      row += rows.length;
+    }
   }
 
-  static constexpr DenseKernels<T> table() { return {eliminate, solve_right, square, extend_add}; }
+  static constexpr DenseKernels<T> table() {
+    return {eliminate, invert, multiply, square, extend_add};
+  }
 };
 
 template <class S>

@@ -317,7 +317,7 @@ TEST(SeamMultipliers, RefinementKeepsTheSeamsClosed) {
   ASSERT_EQ(solver.solve(x), SolveStatus::Ok);
   EXPECT_GT(solver.last_times().refinements, 0);
   EXPECT_LT(solver.last_times().error, solver.last_times().first_error);
-  EXPECT_LT((sewn.rows() * x).cwiseAbs().maxCoeff(), 1e-10 * x.cwiseAbs().maxCoeff());
+  EXPECT_LT((sewn.rows() * x).cwiseAbs().maxCoeff(), 1e-9 * x.cwiseAbs().maxCoeff());
 }
 
 TEST(SeamMultipliers, BadMatricesAreAStatus) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include <piecework/core/error.hpp>
 #include <piecework/core/parallel.hpp>
@@ -108,21 +109,24 @@ class Factorizer {
         scope_(scope),
         symbolic_(*input.symbolic),
         plan_(*input.plan),
-        kernels_(kernels<N>(input.isa).dense),
+        kernels_(kernels<N>(input.isa)),
         factor_(factor),
-        updates_(updates) {}
+        updates_(updates) {
+    PIECEWORK_ASSERT(input.layout.strip_cols == kernels_.layout.strip_cols &&
+                     input.layout.chunk_rows % kernels_.layout.chunk_rows == 0);
+  }
 
   FactorOutcome run();
 
  private:
   struct Scratch {
-    AlignedArray<N> front, panel, transposed;
+    AlignedArray<N> front, panel, block;
     std::vector<RowRun> runs;
     AlignedArray<N> stack;
     FactorOutcome outcome;
     N* front_of(std::size_t count) { return grow(front, count); }
     N* panel_of(std::size_t count) { return grow(panel, count); }
-    N* transposed_of(std::size_t count) { return grow(transposed, count); }
+    N* block_of(std::size_t count) { return grow(block, count); }
     static N* grow(AlignedArray<N>& array, std::size_t count) {
       if (array.size() < count) array = AlignedArray<N>(count);
       return array.data();
@@ -143,6 +147,7 @@ class Factorizer {
   void update_trailing(const FrontMatrix<N>& matrix, int first, int end, int last, bool tiled);
   void store_panel(std::size_t p, const FrontMatrix<N>& matrix, double diagonal, Scratch& scratch);
   void pack(const N* from, int ld, int rows, int cols, N sign, T* to) const;
+  void repack(const N* from, int rows, int cols, T* to) const;
   void note(const FactorOutcome& part, FactorOutcome& whole) const;
 
   [[nodiscard]] bool in_scope(int f) const {
@@ -158,7 +163,7 @@ class Factorizer {
   const Scope& scope_;
   const Symbolic& symbolic_;
   const TreePlan& plan_;
-  const DenseKernels<N>& kernels_;
+  const Kernels<N>& kernels_;
   TreeFactor<T>& factor_;
   UpdateMatrices<N>& updates_;
 };
@@ -215,8 +220,8 @@ void Factorizer<T, N>::extend_add(int child, const N* update, int parent,
     else
       runs.push_back({place, 1});
   }
-  kernels_.extend_add(matrix.data, matrix.stride(), update, static_cast<int>(rows.size()),
-                      runs.data(), static_cast<int>(runs.size()));
+  kernels_.dense.extend_add(matrix.data, matrix.stride(), update, static_cast<int>(rows.size()),
+                            runs.data(), static_cast<int>(runs.size()));
 }
 
 /// Lower triangle of columns end ... last - 1 and the rows below -= L L^T with L's columns
@@ -279,6 +284,26 @@ void Factorizer<T, N>::pack(const N* from, int ld, int rows, int cols, N sign, T
   }
 }
 
+/// The same from a block that is in the order of N's kernels.
+template <class T, class N>
+void Factorizer<T, N>::repack(const N* from, int rows, int cols, T* to) const {
+  const PanelLayout& layout = input_.layout;
+  const int strip = layout.strip_cols;
+  const int small = kernels_.layout.chunk_rows;
+  for (int first = 0; first < cols; first += strip) {
+    const int count = std::min(strip, cols - first);
+    const N* in = from + kernels_.layout.block_size(rows, first);
+    T* out = to + layout.block_size(rows, first);
+    for (int r = 0; r < rows; r += small) {
+      const int length = std::min(small, rows - r);
+      const int begin = r / layout.chunk_rows * layout.chunk_rows;
+      const int chunk = std::min(layout.chunk_rows, rows - begin);
+      for (int c = 0; c < count; ++c, in += length)
+        std::copy_n(in, length, out + begin * count + c * chunk + (r - begin));
+    }
+  }
+}
+
 /// Writes panel p, whose columns of L are done, in the form that the sweeps read. `diagonal`: the
 /// largest entry that D had on its diagonal.
 template <class T, class N>
@@ -290,19 +315,13 @@ void Factorizer<T, N>::store_panel(std::size_t p, const FrontMatrix<N>& matrix, 
   const N* l_below = matrix.at(panel.first + cols, panel.first);
   T* own = factor_.numbers.data() + panel.own;
   T* below = factor_.numbers.data() + panel.below;
-  // X = [I; L_below] L_own^-1 holds L_own^-1 and B.
-  const int own_stride = front_stride(cols);
-  const int below_stride = front_stride(panel.rows);
-  const auto size = static_cast<std::size_t>(cols);
-  N* x = scratch.panel_of(size * static_cast<std::size_t>(3 * own_stride + below_stride));
-  N* inverse = x + size * static_cast<std::size_t>(own_stride);
-  N* work = inverse + size * static_cast<std::size_t>(own_stride);
-  N* b = work + size * static_cast<std::size_t>(own_stride);
-  std::memset(x, 0, size * static_cast<std::size_t>(own_stride) * sizeof(N));
-  for (std::size_t c = 0; c < size; ++c) x[c * static_cast<std::size_t>(own_stride) + c] = N(1);
-  kernels_.solve_right(l_own, matrix.stride(), cols, x, own_stride, own_stride);
-  kernels_.square(x, own_stride, cols, inverse, own_stride, work);
-  const double condition = diagonal * norm1(cols, inverse, own_stride);
+  const int stride = front_stride(cols);
+  const auto square = static_cast<std::size_t>(cols) * static_cast<std::size_t>(stride);
+  N* l_inverse = scratch.panel_of(3 * square);
+  N* inverse = l_inverse + square;
+  kernels_.dense.invert(l_own, matrix.stride(), cols, l_inverse, stride);
+  kernels_.dense.square(l_inverse, stride, cols, inverse, stride, inverse + square);
+  const double condition = diagonal * norm1(cols, inverse, stride);
   const bool substitute = !(condition <= input_.condition_limit);
   factor_.substituted[p] = substitute;
   if (substitute) {
@@ -312,15 +331,17 @@ void Factorizer<T, N>::store_panel(std::size_t p, const FrontMatrix<N>& matrix, 
     return;
   }
   scratch.outcome.max_condition = std::max(scratch.outcome.max_condition, condition);
-  pack(inverse, own_stride, cols, cols, N(1), own);
-  if (panel.rows == 0) return;
-  for (std::size_t c = 0; c < size; ++c) {
-    N* column = b + c * static_cast<std::size_t>(below_stride);
-    std::copy_n(l_below + c * static_cast<std::size_t>(matrix.stride()), panel.rows, column);
-    std::fill(column + panel.rows, column + below_stride, N(0));
+  pack(inverse, stride, cols, cols, N(1), own);
+  const auto multiply = [&](N* out) {
+    kernels_.dense.multiply(l_below, matrix.stride(), panel.rows, l_inverse, stride, cols, out);
+  };
+  if constexpr (std::is_same_v<T, N>) {
+    multiply(below);
+  } else {
+    N* block = scratch.block_of(kernels_.layout.block_size(panel.rows, cols));
+    multiply(block);
+    repack(block, panel.rows, cols, below);
   }
-  kernels_.solve_right(l_own, matrix.stride(), cols, b, below_stride, below_stride);
-  pack(b, below_stride, panel.rows, cols, N(-1), below);
 }
 
 /// Factors the front's own columns, panel by panel; its update matrix is left below them.
@@ -329,7 +350,6 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
                                  Scratch& scratch) {
   const FrontPlan& plan = plan_.fronts[static_cast<std::size_t>(f)];
   const int last = frozen(f) ? matrix.width : matrix.size();
-  N* work = scratch.transposed_of(8 * static_cast<std::size_t>(matrix.size()));
   for (int k = 0; k < plan.num_panels; ++k) {
     const std::size_t p = plan.first_panel + static_cast<std::size_t>(k);
     const Panel& panel = plan_.panels[p];
@@ -338,8 +358,8 @@ bool Factorizer<T, N>::eliminate(int f, const FrontMatrix<N>& matrix, bool tiled
     for (int c = panel.first; c < end; ++c)
       diagonal = std::max(diagonal, static_cast<double>(*matrix.at(c, c)));
     const bool small = matrix.size() <= kSmallFront;
-    if (!kernels_.eliminate(matrix.at(0, 0), matrix.size(), matrix.stride(), panel.first, end,
-                            small ? last : end, work))
+    if (!kernels_.dense.eliminate(matrix.at(0, 0), matrix.size(), matrix.stride(), panel.first, end,
+                                  small ? last : end))
       return false;
     for (int c = panel.first; c < end; ++c) {
       const auto pivot = static_cast<double>(*matrix.at(c, c));
