@@ -74,7 +74,14 @@ void HessianMatrix::set_pattern(const Reduction& reduction, SparseMatrix system)
   scalars_.resize(0, 0);
 }
 
-Mat3 HessianMatrix::gathered(std::size_t k) const {
+bool HessianMatrix::is_scalar(int entry) const {
+  const auto k = static_cast<std::size_t>(entry);
+  return triangle_uses_.begin[k] == triangle_uses_.begin[k + 1] &&
+         hinge_uses_.begin[k] == hinge_uses_.begin[k + 1];
+}
+
+Mat3 HessianMatrix::gathered(int entry) const {
+  const auto k = static_cast<std::size_t>(entry);
   Mat3 block = system_.valuePtr()[k] * Mat3::Identity();
   for (auto u = triangle_uses_.begin[k]; u < triangle_uses_.begin[k + 1]; ++u) {
     const Use& use = triangle_uses_.use[static_cast<std::size_t>(u)];
@@ -89,7 +96,7 @@ Mat3 HessianMatrix::gathered(std::size_t k) const {
   return block;
 }
 
-void HessianMatrix::soften(const Positions& x, const StepProblem& problem, HessianForm form) {
+void HessianMatrix::evaluate(const Positions& x, const StepProblem& problem, HessianForm form) {
   parallel_for(stretch_.size(), [&](std::size_t t) {
     const StretchConstraint& c = model_.stretch[t];
     const Mat32 F = deformation_gradient(c, x);
@@ -104,37 +111,13 @@ void HessianMatrix::soften(const Positions& x, const StepProblem& problem, Hessi
 }
 
 void HessianMatrix::assemble(const Positions& x, const StepProblem& problem, HessianForm form) {
-  soften(x, problem, form);
+  evaluate(x, problem, form);
   complete();
 }
 
 void HessianMatrix::complete() {
   blocks_.resize(static_cast<std::size_t>(system_.nonZeros()));
-  parallel_for(blocks_.size(), [&](std::size_t k) { blocks_[k] = gathered(k); });
-}
-
-void HessianMatrix::assemble_rounded(const Positions& x, const StepProblem& problem,
-                                     HessianForm form) {
-  soften(x, problem, form);
-  rounded_.resize(static_cast<std::size_t>(system_.nonZeros()));
-  parallel_for(rounded_.size(), [&](std::size_t k) { rounded_[k] = gathered(k).cast<float>(); });
-}
-
-void HessianMatrix::multiply_rounded(const Positions& x, Positions& y) const {
-  y.resize(count(), 3);
-  const int* begin = system_.outerIndexPtr();
-  const int* row = system_.innerIndexPtr();
-  parallel_for(static_cast<std::size_t>(count()), [&](std::size_t column) {
-    double sum[3] = {0, 0, 0};
-    for (int k = begin[column]; k < begin[column + 1]; ++k) {
-      const float* b = rounded_[static_cast<std::size_t>(k)].data();  // column-major: its transpose
-      const double* v = x.data() + 3 * static_cast<std::ptrdiff_t>(row[k]);
-      for (int i = 0; i < 3; ++i)
-        sum[i] +=
-            double(b[3 * i]) * v[0] + double(b[3 * i + 1]) * v[1] + double(b[3 * i + 2]) * v[2];
-    }
-    for (int i = 0; i < 3; ++i) y(static_cast<Eigen::Index>(column), i) = sum[i];
-  });
+  parallel_for(blocks_.size(), [&](std::size_t k) { blocks_[k] = gathered(static_cast<int>(k)); });
 }
 
 void HessianMatrix::multiply(const Positions& x, Positions& y) const {

@@ -29,12 +29,17 @@ class HessianMatrix {
   /// Evaluates at x (|V| x 3, m).
   void assemble(const Positions& x, const StepProblem& problem, HessianForm form);
 
-  /// The same for multiply_rounded() only, with blocks in 32 bits: half the memory to write and to
-  /// read.
-  void assemble_rounded(const Positions& x, const StepProblem& problem, HessianForm form);
+  /// The same but for the blocks: gathered() makes them one by one, complete() all.
+  void evaluate(const Positions& x, const StepProblem& problem, HessianForm form);
 
-  /// After assemble_rounded(): what assemble() would have made.
+  /// After evaluate(): what assemble() would have made.
   void complete();
+
+  /// After evaluate(): block k.
+  [[nodiscard]] Mat3 gathered(int k) const;
+
+  /// Block k is the entry of K~ times the identity, whatever the positions.
+  [[nodiscard]] bool is_scalar(int k) const;
 
   /// Number of block rows, n_f.
   [[nodiscard]] int count() const { return static_cast<int>(system_.cols()); }
@@ -45,9 +50,6 @@ class HessianMatrix {
 
   /// y = H x; both n_f x 3. After assemble().
   void multiply(const Positions& x, Positions& y) const;
-
-  /// The same after assemble_rounded().
-  void multiply_rounded(const Positions& x, Positions& y) const;
 
   /// The blocks as 3 n_f x 3 n_f scalars, lower triangle: row 3 i + c is coordinate c of unknown i.
   /// The reference is valid until the next call; its pattern stays as it is until set_pattern().
@@ -74,8 +76,6 @@ class HessianMatrix {
                 std::vector<Addition>& additions) const;
   [[nodiscard]] Uses sorted(const std::vector<Addition>& additions) const;
   void make_scalar_pattern();
-  void soften(const Positions& x, const StepProblem& problem, HessianForm form);
-  [[nodiscard]] Mat3 gathered(std::size_t k) const;
 
   const ClothModel& model_;
   std::vector<int> curved_;  ///< bending constraints with a curved rest shape
@@ -84,7 +84,6 @@ class HessianMatrix {
   std::vector<StretchSoftening> stretch_;  ///< per triangle
   std::vector<Mat3> bend_;                 ///< per curved hinge
   std::vector<Mat3> blocks_;
-  std::vector<Eigen::Matrix3f> rounded_;
   SparseMatrix scalars_;
 };
 

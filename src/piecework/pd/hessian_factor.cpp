@@ -18,14 +18,13 @@ constexpr global::TreeOptions kOptions = {
 
 HessianFactor::HessianFactor() : tree_(kOptions) {}
 
-double HessianFactor::price(const global::FactorReport& system,
-                            const model::HessianMatrix& hessian) {
+double HessianFactor::price(const global::FactorReport& system, const HessianProduct& hessian,
+                            int num_unknowns) {
   constexpr double kFlopsPerByte = 4;  // of dense 32-bit kernels, while memory delivers one byte
   constexpr double kCube = 27;
   const double factors = 2 * 2 * sizeof(float) * system.nonzeros;  // K~ and Kn, there and back
-  const double blocks = sizeof(Eigen::Matrix3f) * static_cast<double>(hessian.system().nonZeros());
-  const double vectors = 12 * 3 * sizeof(double) * static_cast<double>(hessian.count());
-  return kCube * system.flops / (kFlopsPerByte * (factors + blocks + vectors));
+  const double vectors = 12 * 3 * sizeof(double) * static_cast<double>(num_unknowns);
+  return kCube * system.flops / (kFlopsPerByte * (factors + hessian.bytes() + vectors));
 }
 
 /// |sum_k beta_k u_k|^2 <= sum |beta| sum_k |beta_k| |u_k|^2 in any norm; the same for carriers.

@@ -8,6 +8,7 @@
 #include <piecework/global/exact_solver.hpp>
 #include <piecework/model/contact_terms.hpp>
 #include <piecework/model/hessian_matrix.hpp>
+#include <piecework/pd/hessian_product.hpp>
 
 namespace piecework::pd {
 
@@ -36,7 +37,7 @@ class HessianFactor {
   /// Iterations of conjugate gradients in the metric that take about as long as one factorisation,
   /// by counts. \param system  what the solver of K~ reports
   [[nodiscard]] static double price(const global::FactorReport& system,
-                                    const model::HessianMatrix& hessian);
+                                    const HessianProduct& hessian, int num_unknowns);
 
  private:
   void add_contact(std::span<const model::ContactBlock> contact, const model::ClothModel& model,

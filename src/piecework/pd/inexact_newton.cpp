@@ -79,16 +79,18 @@ void InexactNewton::assemble(const Positions& x, const model::StepProblem& probl
   if (!reduction_) {
     reduction_ = &metric.reduction();
     hessian_.set_pattern(*reduction_, reduction_->system(metric.K()));
-    price_ = kPrices * HessianFactor::price(metric.solver().report(), hessian_);
+    cloth_.set_pattern(hessian_);
+    price_ = kPrices * HessianFactor::price(metric.solver().report(), cloth_, hessian_.count());
   }
-  hessian_.assemble_rounded(x, problem, model::HessianForm::Projected);
+  hessian_.evaluate(x, problem, model::HessianForm::Projected);
+  cloth_.take(hessian_);
   blocks_.clear();
   if (contact) contact->hessian(blocks_);
   contact_.take(blocks_, model_, *reduction_);
 }
 
 void InexactNewton::multiply(const Positions& d, Positions& product) {
-  hessian_.multiply_rounded(d, product);
+  cloth_.multiply(d, product);
   contact_.add(d, product);
 }
 

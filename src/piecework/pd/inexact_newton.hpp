@@ -13,6 +13,7 @@
 #include <piecework/model/hessian_matrix.hpp>
 #include <piecework/pd/contact_product.hpp>
 #include <piecework/pd/hessian_factor.hpp>
+#include <piecework/pd/hessian_product.hpp>
 #include <piecework/pd/metric.hpp>
 
 namespace piecework::pd {
@@ -54,6 +55,7 @@ class InexactNewton {
   const model::ClothModel& model_;
   const model::Reduction* reduction_ = nullptr;  ///< the one that hessian_ has its pattern from
   std::vector<model::ContactBlock> blocks_;
+  HessianProduct cloth_;
   ContactProduct contact_;
   std::unique_ptr<HessianFactor> factor_;  ///< absent until first worth it
   bool factored_ = false;                  ///< preconditions in the rest of the step

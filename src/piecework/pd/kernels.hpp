@@ -27,6 +27,18 @@ struct FloatRows {
   int count;
 };
 
+/// Entries of a sparse matrix of 3 x 3 blocks, row after row.
+struct BlockEntries {
+  const int* begin;      ///< per row, and the end
+  const int* offset;     ///< per entry: 3 * column
+  const float* numbers;  ///< per entry
+};
+
+struct BlockRows {
+  BlockEntries dense;   ///< 9 numbers each, column-major, and one number behind the last
+  BlockEntries scalar;  ///< 1 number each, times the identity
+};
+
 struct OuterKernels {
   /// Per batch kPairs x kLanes numbers
   ///     w [c_T (t_a . n_a)(t_b . n_b) + (G_a^T B G_b)(n . n_a)(n . n_b)],
@@ -49,6 +61,10 @@ struct OuterKernels {
   /// sum[k] = row_k . y and with_after[k] = row_k . after.
   void (*two_products)(const FloatRows& rows, const float* y, const double* after,
                        std::size_t begin, std::size_t end, double* with_y, double* with_after);
+
+  /// Rows begin ... end - 1 of y = A x; x, y: three numbers per row.
+  void (*block_product)(const BlockRows& rows, const double* x, std::size_t begin, std::size_t end,
+                        double* y);
 
   /// a . b.
   double (*dot)(const double* a, const double* b, std::size_t begin, std::size_t end);

@@ -200,7 +200,34 @@ double dot_product(const double* a, const double* b, std::size_t begin, std::siz
   return product(a, b, begin, end);
 }
 
-constexpr OuterKernels kTable{normal_pairs, products,     combine,
-                              difference,   two_products, dot_product};
+/// Three numbers and one that nobody uses.
+typedef double Row __attribute__((vector_size(32)));
+
+Row widen(const float* p) {
+  Row row;
+  for (int i = 0; i < 4; ++i) row[i] = p[i];
+  return row;
+}
+
+void block_product(const BlockRows& rows, const double* x, std::size_t begin, std::size_t end,
+                   double* y) {
+  for (std::size_t i = begin; i < end; ++i) {
+    Row sum[3] = {};
+    for (int k = rows.dense.begin[i]; k < rows.dense.begin[i + 1]; ++k) {
+      const double* v = x + rows.dense.offset[k];
+      const float* block = rows.dense.numbers + 9 * static_cast<long>(k);
+      for (int j = 0; j < 3; ++j) sum[j] += v[j] * widen(block + 3 * j);
+    }
+    for (int k = rows.scalar.begin[i]; k < rows.scalar.begin[i + 1]; ++k) {
+      const double* v = x + rows.scalar.offset[k];
+      sum[0] += static_cast<double>(rows.scalar.numbers[k]) * Row{v[0], v[1], v[2], 0};
+    }
+    const Row total = sum[0] + sum[1] + sum[2];
+    for (std::size_t j = 0; j < 3; ++j) y[3 * i + j] = total[j];
+  }
+}
+
+constexpr OuterKernels kTable{normal_pairs, products,      combine,    difference,
+                              two_products, block_product, dot_product};
 
 }  // namespace
