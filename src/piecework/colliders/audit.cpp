@@ -271,7 +271,7 @@ std::vector<std::string> notes(const Audit& audit, const Traits& traits, double 
                     "lose less contact",
                     1e3 * audit.step_displacement, 1e3 * *traits.thickness));
   if (!audit.inside.empty())
-    add(fmt::format("{} cloth vertices start inside, the deepest {:.3g} mm deep; move or shrink it",
+    add(fmt::format("{} cloth vertices start inside, the deepest {:.3g} mm deep",
                     audit.inside.size(), 1e3 * audit.depth));
   return lines;
 }

@@ -45,7 +45,8 @@ double signed_volume(const Triangles& triangles, const Positions& x);
 std::vector<int> points_inside(const Triangles& triangles, const Positions& x,
                                const Positions& points);
 
-/// The audit in words: first a line on the body itself, then one per problem.
+/// The audit in words: first a line on the body itself, then one per problem. What becomes of
+/// vertices that start inside is told by who sees to them.
 /// \param cloth_extent  largest extent of the cloths, m
 std::vector<std::string> notes(const Audit& audit, const Traits& traits, double cloth_extent);
 
