@@ -33,9 +33,14 @@ class HessianProduct {
     std::vector<int> offset;
     std::vector<float> numbers;
   };
-  Rows dense_;                ///< 9 numbers each, and one more at the end
-  Rows scalar_;               ///< 1 number each
-  std::vector<int> entries_;  ///< of dense_, in the matrix's numbers
+  /// A block of the matrix and where it and its mirror image belong in dense_.
+  struct Pair {
+    int block, place, mirror;
+  };
+
+  Rows dense_;   ///< 9 numbers each, and one more at the end
+  Rows scalar_;  ///< 1 number each
+  std::vector<Pair> pairs_;
 };
 
 }  // namespace piecework::pd
