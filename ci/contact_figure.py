@@ -6,7 +6,7 @@ from svg import document, line, origin, text
 
 WIDTH, HEIGHT = 1200, 600
 LEFT, RIGHT, TOP, BOTTOM, GAP = 74, 24, 116, 66, 66
-PREFERRED_SIZE, PREFERRED_RATIO, PREFERRED_SET = 60025, 1000, "disk"
+PREFERRED_SIZE, PREFERRED_RATIO, PREFERRED_SET = 90000, 1000, "disk"
 FLOOR = 1e-7
 
 # In the order of tables. Hues that colour-blind people tell apart [Okabe, Ito]; the paper's are
