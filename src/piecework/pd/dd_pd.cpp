@@ -31,15 +31,17 @@ constexpr double kIterationsPerFactor = 6;
 constexpr int kIterationsPerRefresh = 15;
 /// A step with normals that took no more iterations might have done without.
 constexpr int kEasyIterations = 2;
-/// Newton's direction: by what factor more inner iterations than with a fresh metric pay for
+/// Steps between two attempts without normals, at most.
+constexpr double kLongestWait = 16;
+/// Newton's direction: increments up to so many tolerances must be exact.
+constexpr double kSafety = 4;
+/// By what factor more inner iterations than with a fresh metric, and how many more, pay for
 /// another one.
-constexpr double kSafety = 4;  // increments up to so many tolerances must be exact
 constexpr double kPcgGrowth = 1.5;
 constexpr int kPcgAllowance = 10;
 /// Times in a step that pins and obstacles which cloth has barred try to go on. What it then still
 /// bars, pinched between them, waits for the next step.
 constexpr int kHeldAttempts = 10;
-constexpr double kLongestWait = 16;  // steps between two attempts without normals
 /// Without normals an error is believed if the gradient allows at most so many times as much...
 constexpr double kBelief = 100;
 /// ... and with them after so many iterations, and if the gradient has fallen by no more than this
