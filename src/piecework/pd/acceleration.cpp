@@ -131,6 +131,12 @@ double dot(const Positions& a, const Positions& b) {
                               1);
 }
 
+double longest(const Positions& d) {
+  return std::sqrt(parallel_max(static_cast<std::size_t>(d.rows()), [&](std::size_t i) {
+    return d.row(static_cast<Eigen::Index>(i)).squaredNorm();
+  }));
+}
+
 std::string to_string(const AccelerationOptions& options) {
   switch (options.kind) {
     case AccelerationKind::None:

@@ -57,4 +57,7 @@ std::unique_ptr<Acceleration> make_acceleration(const AccelerationOptions& optio
 /// sum_i a_i b_i in a fixed order.
 double dot(const Positions& a, const Positions& b);
 
+/// Length of the longest row.
+double longest(const Positions& d);
+
 }  // namespace piecework::pd

@@ -96,7 +96,7 @@ class DdPd final : public model::Minimizer {
   void find_moved();
   void advance_held(const model::StepProblem& problem, model::StepReport& report);
   [[nodiscard]] bool normals_are_outdated(const model::StepReport& report) const;
-  [[nodiscard]] bool believable(const model::StepReport& report) const;
+  [[nodiscard]] bool believable(const model::StepReport& report);
 
   const model::ClothModel& model_;
   model::ContactTerms* contact_ = nullptr;  ///< of the step

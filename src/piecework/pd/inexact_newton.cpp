@@ -18,12 +18,6 @@ constexpr double kSmall = 0.03;
 /// each direction in the rest of the step needs a factor of its own.
 constexpr double kPrices = 6;
 
-double longest(const Positions& d) {
-  return std::sqrt(parallel_max(static_cast<std::size_t>(d.rows()), [&](std::size_t i) {
-    return d.row(static_cast<Eigen::Index>(i)).squaredNorm();
-  }));
-}
-
 /// Numbers per task.
 constexpr std::size_t kChunk = 4096;
 
