@@ -56,8 +56,8 @@ class ContactTables(TablesTestCase):
 
     def test_counts_stand_side_by_side(self):
         head = self.lines("| iterations")[0]
-        self.assertEqual(head[1:], ["3721, 50", "3721, 10000", "60025, 50", "60025, 10000"])
-        self.assertEqual(self.lines("| kinv_pcg")[0], ["kinv_pcg", "-", "50", "20 to 40", "-"])
+        self.assertEqual(head[1:], ["3721, 10000", "60025, 50"], "only what was measured")
+        self.assertEqual(self.lines("| kinv_pcg")[0], ["kinv_pcg", "50", "20 to 40"])
 
     def test_refactoring_comes_first_in_every_table(self):
         after = self.text.split("### disk, ratio 50, 2 threads")[1].splitlines()
