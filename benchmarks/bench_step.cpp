@@ -1,10 +1,15 @@
 // The vanilla baseline's step: time per L-G iteration split into local and global, beside the same
-// on one thread; and what it takes to get to the first step. Validation: both thread counts give
-// the same bits, and the energy is finite.
+// on one thread; what it takes to get to the first step; and whole steps of scene A, where public
+// simulators were measured too. Validation: both thread counts give the same bits, and the energy
+// is finite.
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
+#include <numeric>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
@@ -12,9 +17,11 @@
 #include <piecework/baselines/vanilla_pd.hpp>
 #include <piecework/core/clock.hpp>
 #include <piecework/core/parallel.hpp>
+#include <piecework/core/statistics.hpp>
 #include <piecework/mesh/generate.hpp>
 #include <piecework/runner/methods.hpp>
 #include <piecework/runner/world.hpp>
+#include <piecework/scene/scene_io.hpp>
 #include <piecework/testing/small_cloths.hpp>
 
 #include "bench.hpp"
@@ -119,6 +126,58 @@ void startup(benchmark::State& state) {
   state.counters["peak_mb"] = peak_megabytes();
 }
 
+/// Public simulators on scene A: processor ms per step on one thread of another machine of this
+/// kind. Stark 16197f7 ends a step when no vertex moves faster than kStillSpeed between Newton
+/// iterates, C-IPC (Codim-IPC 9c6cbe3) when their root mean square does not.
+struct Peers {
+  std::int64_t vertices;
+  double c_ipc_ms, stark_ms;
+};
+constexpr Peers kPeers[] = {
+    {2500, 552, 70}, {10000, 2703, 321}, {19881, 5418, 800}, {60025, 22200, 5390}};
+constexpr double kStillSpeed = 1e-3;     ///< m/s
+constexpr std::size_t kFirstSteps = 12;  ///< the dearest rows of the peers are no longer
+
+/// Scene A from its beginning to Stark's tolerance, on one thread.
+void hanging(benchmark::State& state, const Peers& peers) {
+  scene::Scene scene = scene::load_scene("hanging_tablecloth");
+  scene::Mesh& mesh = scene.cloths.front().mesh;
+  mesh.columns = mesh.rows = side_of(peers.vertices);
+  scene.quality.stop = "dx_inf";
+  scene.quality.tolerance = kStillSpeed * scene.step.h;  // the unit box is a metre
+  const int steps = quick() ? static_cast<int>(kFirstSteps) : scene.step.steps;
+  std::vector<double> cpu_ms;
+  double iterations = 0, converged = 0, energy = 0;
+  for (auto _ : state)
+    ThreadPool(1).run([&] {
+      const auto world = runner::build_world(scene);
+      const auto integrator = runner::make_integrator(*world);
+      model::State motion = integrator->initial_state(world->part_velocity);
+      integrator->prepare(motion);
+      const Stopwatch watch;
+      for (int k = 0; k < steps; ++k) {
+        const double before = ProcessClock::cpu();
+        const model::StepReport report = integrator->step(motion);
+        cpu_ms.push_back(1e3 * (ProcessClock::cpu() - before));
+        iterations += report.iterations;
+        converged += report.converged ? 1 : 0;
+        energy = report.energy;
+      }
+      state.SetIterationTime(1e-3 * watch.elapsed_ms());
+    });
+  if (!std::isfinite(energy)) return fail(state, "not finite");
+  const std::span<const double> first(cpu_ms.data(), kFirstSteps);
+  const double ours = median_interval({first.begin(), first.end()}).median;
+  state.counters["first_cpu_ms"] = ours;
+  state.counters["mean_cpu_ms"] = std::accumulate(cpu_ms.begin(), cpu_ms.end(), 0.0) / steps;
+  state.counters["mean_iterations"] = iterations / steps;
+  state.counters["converged"] = converged / steps;
+  state.counters["quoted_stark_ms"] = peers.stark_ms;
+  state.counters["quoted_c_ipc_ms"] = peers.c_ipc_ms;
+  state.counters["stark_over_ours"] = peers.stark_ms / ours;
+  state.counters["c_ipc_over_ours"] = peers.c_ipc_ms / ours;
+}
+
 const Registration registration([] {
   auto* start = benchmark::RegisterBenchmark("startup", startup);
   start->Unit(benchmark::kSecond)->UseRealTime()->Iterations(1)->ArgName("n");
@@ -129,6 +188,13 @@ const Registration registration([] {
   for (const std::int64_t n : {19881, 60025, 199809})
     for (const std::int64_t threads : {1, 2, 4})
       if (!quick() || n == 19881) steps->Args({n, threads})->Iterations(quick() ? 6 : 10);
+  for (const Peers& peers : kPeers)
+    if (!quick() || peers.vertices == 2500)
+      benchmark::RegisterBenchmark(fmt::format("hanging/n:{}/threads:1", peers.vertices).c_str(),
+                                   hanging, peers)
+          ->Unit(benchmark::kSecond)
+          ->UseManualTime()
+          ->Iterations(1);
 });
 
 }  // namespace
