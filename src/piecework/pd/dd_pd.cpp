@@ -162,14 +162,13 @@ void DdPd::refresh_normals(model::StepReport& report) {
 void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport& report) {
   const bool touching = contact_ && contact_->touching();
   if (options_.normals == NormalPart::Never && !touching) return;
-  const bool doubtful = convergence_.reached(report) && !believable(report);
   if (report.normal_factors > 0) {
     if (newton_proposed_) {
       if (newton_is_outdated()) refresh_normals(report);
       return;
     }
     if (report.iterations >= last_refresh_ + kIterationsPerRefresh ||
-        (doubtful && normals_are_outdated(report)))
+        (doubtful_ && normals_are_outdated(report)))
       refresh_normals(report);
     return;
   }
@@ -177,7 +176,7 @@ void DdPd::consider_normals(const std::vector<double>* memory, model::StepReport
       touching || options_.normals == NormalPart::Always || starts_with_normals(memory);
   const bool later = report.iterations >= kPlainIterations &&
                      convergence_.expected_iterations(report) > kIterationsPerFactor;
-  if (at_once || later || doubtful) refresh_normals(report);
+  if (at_once || later || doubtful_) refresh_normals(report);
 }
 
 bool DdPd::normals_are_outdated(const model::StepReport& report) const {
@@ -334,7 +333,7 @@ void DdPd::begin_step(const model::StepProblem& problem, model::StepReport& repo
   acceleration_->restart();
   metric_.drop_normals();
   contact_ = problem.contact;
-  newton_proposed_ = newton_failed_ = false;
+  newton_proposed_ = newton_failed_ = doubtful_ = false;
   if (newton_) newton_->begin();
   renewals_left_ = options_.friction_renewals;
   held_attempts_ = kHeldAttempts;
@@ -343,7 +342,9 @@ void DdPd::begin_step(const model::StepProblem& problem, model::StepReport& repo
 
 /// Whether the iterate ends the step, and whether anything is still to be had.
 void DdPd::judge(const model::StepProblem& problem, model::StepReport& report) {
-  report.converged = convergence_.reached(report) && believable(report);
+  const bool reached = convergence_.reached(report);
+  report.converged = reached && believable(report);
+  doubtful_ = reached && !report.converged;
   const bool waiting = contact_ && contact_->report().held_back > 0 && held_attempts_ > 0;
   if (waiting) report.converged = false;
   if (report.converged && renewals_left_-- > 0 && renew_friction(problem, report))

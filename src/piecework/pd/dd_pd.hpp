@@ -108,6 +108,7 @@ class DdPd final : public model::Minimizer {
   std::unique_ptr<Acceleration> acceleration_;
   std::unique_ptr<InexactNewton> newton_;  ///< absent until first wanted
   bool newton_proposed_ = false;           ///< d_ is Newton's direction
+  bool doubtful_ = false;                  ///< the stop rule holds, but is not believed
   bool newton_failed_ = false;             ///< the last one led nowhere
   int pcg_iterations_ = 0;                 ///< of the last direction
   int pcg_after_refresh_ = 0;              ///< of the first one with this metric; 0: none yet

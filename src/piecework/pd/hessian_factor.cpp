@@ -18,12 +18,11 @@ constexpr global::TreeOptions kOptions = {
 
 HessianFactor::HessianFactor() : tree_(kOptions) {}
 
-double HessianFactor::price(const global::FactorReport& system, const HessianProduct& hessian,
-                            int num_unknowns) {
+double HessianFactor::price(const global::FactorReport& system, const HessianProduct& hessian) {
   constexpr double kFlopsPerByte = 4;  // of dense 32-bit kernels, while memory delivers one byte
   constexpr double kCube = 27;
   const double factors = 2 * 2 * sizeof(float) * system.nonzeros;  // K~ and Kn, there and back
-  const double vectors = 12 * 3 * sizeof(double) * static_cast<double>(num_unknowns);
+  const double vectors = 12 * 3 * sizeof(double) * static_cast<double>(hessian.count());
   return kCube * system.flops / (kFlopsPerByte * (factors + hessian.bytes() + vectors));
 }
 

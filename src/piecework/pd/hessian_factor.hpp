@@ -37,7 +37,7 @@ class HessianFactor {
   /// Iterations of conjugate gradients in the metric that take about as long as one factorisation,
   /// by counts. \param system  what the solver of K~ reports
   [[nodiscard]] static double price(const global::FactorReport& system,
-                                    const HessianProduct& hessian, int num_unknowns);
+                                    const HessianProduct& hessian);
 
  private:
   void add_contact(std::span<const model::ContactBlock> contact, const model::ClothModel& model,

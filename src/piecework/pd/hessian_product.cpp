@@ -59,7 +59,7 @@ void HessianProduct::take(const model::HessianMatrix& hessian) {
 
 void HessianProduct::multiply(const Positions& d, Positions& product) const {
   static const OuterKernels& kernels = outer_kernels(best_isa());
-  const std::size_t rows = dense_.begin.size() - 1;
+  const auto rows = static_cast<std::size_t>(count());
   product.resize(d.rows(), 3);
   const BlockRows matrix{{dense_.begin.data(), dense_.offset.data(), dense_.numbers.data()},
                          {scalar_.begin.data(), scalar_.offset.data(), scalar_.numbers.data()}};

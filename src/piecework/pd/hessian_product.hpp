@@ -23,6 +23,9 @@ class HessianProduct {
   /// product = H d, sums in 64 bits; both n_f x 3, m -> N.
   void multiply(const Positions& d, Positions& product) const;
 
+  /// Number of block rows, n_f.
+  [[nodiscard]] int count() const { return static_cast<int>(dense_.begin.size()) - 1; }
+
   /// What a product reads of the matrix.
   [[nodiscard]] double bytes() const;
 
@@ -38,8 +41,8 @@ class HessianProduct {
     int block, place, mirror;
   };
 
-  Rows dense_;   ///< 9 numbers each, and one more at the end
-  Rows scalar_;  ///< 1 number each
+  Rows dense_{{0}, {}, {}};   ///< 9 numbers each, and one more at the end
+  Rows scalar_{{0}, {}, {}};  ///< 1 number each
   std::vector<Pair> pairs_;
 };
 

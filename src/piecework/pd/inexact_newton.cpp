@@ -74,7 +74,7 @@ void InexactNewton::assemble(const Positions& x, const model::StepProblem& probl
     reduction_ = &metric.reduction();
     hessian_.set_pattern(*reduction_, reduction_->system(metric.K()));
     cloth_.set_pattern(hessian_);
-    price_ = kPrices * HessianFactor::price(metric.solver().report(), cloth_, hessian_.count());
+    price_ = kPrices * HessianFactor::price(metric.solver().report(), cloth_);
   }
   hessian_.evaluate(x, problem, model::HessianForm::Projected);
   cloth_.take(hessian_);
