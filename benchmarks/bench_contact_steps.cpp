@@ -16,7 +16,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -29,12 +28,12 @@
 #include <piecework/core/atomic_file.hpp>
 #include <piecework/core/parallel.hpp>
 #include <piecework/core/statistics.hpp>
-#include <piecework/runner/methods.hpp>
 #include <piecework/scene/scene_io.hpp>
 
 #include "bench.hpp"
 #include "contact_scenes.hpp"
 #include "power_law.hpp"
+#include "simulation.hpp"
 #include "step_records.hpp"
 
 namespace piecework::bench {
@@ -46,21 +45,6 @@ constexpr const char* kExactTolerance = "1e-5";  ///< mean edges, of steps that 
 constexpr int kMostIterations = 2000;
 
 const Option traces_option("--traces", "file for a record of every step, as JSON");
-
-/// A scene with what simulates it.
-struct Simulation {
-  std::unique_ptr<runner::World> world;
-  std::unique_ptr<model::Integrator> integrator;
-
-  explicit Simulation(const scene::Scene& scene)
-      : world(runner::build_world(scene)), integrator(runner::make_integrator(*world)) {}
-
-  [[nodiscard]] model::State start() const {
-    model::State state = integrator->initial_state(world->part_velocity);
-    integrator->prepare(state);
-    return state;
-  }
-};
 
 /// The same scene with steps that are as good as exact, and nothing checked.
 scene::Scene exact(scene::Scene scene) {

@@ -26,6 +26,8 @@
 
 #include "bench.hpp"
 #include "interleaved.hpp"
+#include "simulation.hpp"
+#include "step_records.hpp"
 
 namespace piecework::bench {
 namespace {
@@ -150,18 +152,15 @@ void hanging(benchmark::State& state, const Peers& peers) {
   double iterations = 0, converged = 0, energy = 0;
   for (auto _ : state)
     ThreadPool(1).run([&] {
-      const auto world = runner::build_world(scene);
-      const auto integrator = runner::make_integrator(*world);
-      model::State motion = integrator->initial_state(world->part_velocity);
-      integrator->prepare(motion);
+      const Simulation simulation(scene);
+      model::State motion = simulation.start();
       const Stopwatch watch;
       for (int k = 0; k < steps; ++k) {
-        const double before = ProcessClock::cpu();
-        const model::StepReport report = integrator->step(motion);
-        cpu_ms.push_back(1e3 * (ProcessClock::cpu() - before));
-        iterations += report.iterations;
-        converged += report.converged ? 1 : 0;
-        energy = report.energy;
+        const StepRecord record = take_step(*simulation.integrator, motion);
+        cpu_ms.push_back(record.cpu_ms);
+        iterations += record.report.iterations;
+        converged += record.report.converged ? 1 : 0;
+        energy = record.report.energy;
       }
       state.SetIterationTime(1e-3 * watch.elapsed_ms());
     });

@@ -12,7 +12,7 @@
 
 namespace piecework::bench {
 
-/// One step with contact.
+/// One step.
 struct StepRecord {
   int step = 0;       ///< from 1
   double cpu_ms = 0;  ///< processor time of all threads
@@ -20,10 +20,11 @@ struct StepRecord {
   /// Largest distance of its end from the exact end, in mean edges; NaN: not known.
   double true_error = std::numeric_limits<double>::quiet_NaN();
 
+  /// \pre the integrator has contact
   [[nodiscard]] const model::ContactReport& contact() const { return *report.contact; }
 };
 
-/// Takes a step. \pre the integrator has contact
+/// Takes a step.
 StepRecord take_step(model::Integrator& integrator, model::State& state);
 
 /// One step again from `before`, by an integrator that solves it far more tightly: the largest
@@ -32,7 +33,7 @@ double distance_from_exact(model::Integrator& exact, model::State before, const 
                            double unit);
 
 /// Times, iterations, shares of the phases, contacts and their growth, by name. A share is of the
-/// time of all steps. \pre records not empty
+/// time of all steps. \pre records not empty, with contact
 std::map<std::string, double> summary(const std::vector<StepRecord>& records);
 
 /// Why the records are not valid: something passed through something, or nothing ever touched.
