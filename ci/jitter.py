@@ -148,7 +148,7 @@ class Runner:
                 return subprocess.CompletedProcess(command, known["exit"], "", known["stderr"])
             memory.unlink()
         done = subprocess.run(command, capture_output=True, text=True)
-        if directory.is_dir():
+        if directory.is_dir() and done.returncode >= 0:  # below: killed
             write(memory, json.dumps({"made_by": made_by, "exit": done.returncode,
                                       "stderr": done.stderr}))
         return done
@@ -229,6 +229,8 @@ def main():
     parser.add_argument("--work", type=Path, default=Path("out/jitter"), help="directory for the runs")
     parser.add_argument("--out", type=Path, default=ROOT / "results/tables/jitter.md")
     options = parser.parse_args()
+    if not Path(options.program).is_file():
+        parser.error(f"{options.program}: no such program; bash ci/jitter.sh builds one")
     runner = Runner(options)
     scenes = [runner.scene(name) for name in options.scenes or contact_scenes(ROOT / "scenes")]
     write(options.out, jitter_md(scenes, runner.environment, options.coarse))

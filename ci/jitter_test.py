@@ -18,7 +18,7 @@ SCENE = {"name": "pile", "cloths": [
 # Takes the place of piecework: "pile" is sound, in the third run of "leak" something passes through,
 # "crash" ends with an error, "lost" cannot be read.
 PROGRAM = f"""#!{sys.executable}
-import json, sys
+import json, os, signal, sys
 from pathlib import Path
 name, directory = sys.argv[2], Path(sys.argv[4])
 if name == "lost":
@@ -33,6 +33,8 @@ record = dict(environment=dict(cpu="Abacus", revision="cafe"), frames=frames, sc
     vertices=9, resolved={SCENE!r}, settings=sys.argv[5:]))
 directory.mkdir(parents=True, exist_ok=True)
 (directory / "run.json").write_text(json.dumps(record))
+if name == "killed" and number:
+    os.kill(os.getpid(), signal.SIGKILL)
 if name == "crash" and number == 1:
     sys.exit("piecework: step 3: not finite")
 sys.exit(1 if passed and "--strict" in sys.argv else 0)
@@ -120,6 +122,11 @@ class Runs(unittest.TestCase):
         self.assertTrue(fresh("--runs", "3", "--coarse"))
         self.program.write_text(PROGRAM + "# another version")
         self.assertTrue(fresh("--runs", "3", "--coarse"))
+
+    def test_a_run_that_was_killed_has_not_ended(self):
+        self.run_script("--runs", "1", "killed", "pile")
+        ended = [p.parent.parent.name for p in (self.folder / "work").glob("*/*/jitter.json")]
+        self.assertEqual(ended, ["pile"])
 
     def test_settings_of_a_scene_reach_that_scene_only(self):
         self.run_script("--runs", "1", "--set", "pile:cloths.2.mesh.file=other.obj", "pile", "leak")
